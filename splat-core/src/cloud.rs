@@ -1,0 +1,206 @@
+//! A cloud of oriented point splats, as it comes from a file.
+
+use crate::Error;
+use glam::{DVec3, Vec3};
+
+/// Oriented point splats, as a structure of arrays.
+///
+/// Positions are stored as `f32` offsets from an `f64` origin, so that clouds in map coordinates (millions of
+/// metres from zero) keep their precision. The index of a splat is its place in the file that it came from:
+/// bad points are not taken out, they are recognised by [`Cloud::defect`] and skipped.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cloud {
+    /// World position of offset zero, in scene units.
+    pub origin: DVec3,
+    /// Offsets from the origin, in scene units.
+    pub positions: Vec<Vec3>,
+    /// Unit normals; empty where the cloud has none (see [`crate::prepare`]).
+    pub normals: Vec<Vec3>,
+    /// Extents of the splats.
+    pub shapes: Shapes,
+    /// Linear, scene-referred colours; `None` where the cloud has none.
+    pub colors: Option<Vec<Vec3>>,
+    /// Opacities in [0, 1]; `None` is opaque.
+    pub opacities: Option<Vec<f32>>,
+    /// Surface area that each splat stands for, in squared scene units; `None` is unknown (see
+    /// [`crate::prepare`]). SPEC section 4 turns it into normalised weights.
+    pub areas: Option<Vec<f32>>,
+    /// Whether the normals tell the outside from the inside. Without that every splat faces the camera.
+    pub oriented: bool,
+}
+
+/// The extent of each splat.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shapes {
+    /// Round splats: the standard deviation `sigma` of each (the listing's `size`), in scene units.
+    /// 0 is unknown, and estimated by [`crate::prepare`].
+    Discs(Vec<f32>),
+    /// Elliptical splats: the two sigma-scaled tangent axes of each, in scene units.
+    Ellipses(Vec<[Vec3; 2]>),
+}
+
+impl Default for Shapes {
+    fn default() -> Self {
+        Self::Discs(Vec::new())
+    }
+}
+
+impl Shapes {
+    /// Number of splats described.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Discs(sizes) => sizes.len(),
+            Self::Ellipses(axes) => axes.len(),
+        }
+    }
+
+    /// Whether no splat is described.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Why a splat is never rendered. SPEC section 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Defect {
+    /// A coordinate, normal, size, colour, opacity or area is infinite or not a number.
+    NotFinite,
+    /// The normal, or the area spanned by the two axes, is zero.
+    ZeroNormal,
+    /// The size is negative.
+    NegativeSize,
+    /// The size is zero, and nothing estimated it.
+    UnknownSize,
+}
+
+impl Defect {
+    /// The name of the cause in statistics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotFinite => "not_finite",
+            Self::ZeroNormal => "zero_normal",
+            Self::NegativeSize => "negative_size",
+            Self::UnknownSize => "unknown_size",
+        }
+    }
+}
+
+impl Cloud {
+    /// A cloud of bare points: `positions` in world coordinates (scene units), nothing else known.
+    ///
+    /// The origin is chosen by [`choose_origin`]. A point too far from it for `f32` becomes infinite, which
+    /// [`Cloud::defect`] reports.
+    pub fn from_points(positions: &[DVec3]) -> Self {
+        let origin = choose_origin(positions);
+        Self {
+            origin,
+            positions: positions.iter().map(|&p| (p - origin).as_vec3()).collect(),
+            shapes: Shapes::Discs(vec![0.0; positions.len()]),
+            ..Self::default()
+        }
+    }
+
+    /// Number of splats, good and bad.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether the cloud has no splat at all.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// World position of a splat, in scene units.
+    pub fn world_position(&self, index: usize) -> DVec3 {
+        self.origin + self.positions[index].as_dvec3()
+    }
+
+    /// Checks that all arrays belong together.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if an array is neither absent nor as long as the positions.
+    pub fn check_lengths(&self) -> Result<(), Error> {
+        let expected = self.len();
+        let lengths = [
+            ("normals", (!self.normals.is_empty()).then_some(self.normals.len())),
+            ("shapes", Some(self.shapes.len())),
+            ("colors", self.colors.as_ref().map(Vec::len)),
+            ("opacities", self.opacities.as_ref().map(Vec::len)),
+            ("areas", self.areas.as_ref().map(Vec::len)),
+        ];
+        for (what, length) in lengths {
+            if let Some(found) = length.filter(|&found| found != expected) {
+                return Err(Error::Length { what, found, expected });
+            }
+        }
+        Ok(())
+    }
+
+    /// Why the splat must not be rendered, or `None` if it is fit. SPEC section 2.
+    ///
+    /// Expects a cloud whose arrays belong together and whose normals are known.
+    pub fn defect(&self, index: usize) -> Option<Defect> {
+        let finite = self.positions[index].is_finite()
+            && self.normals[index].is_finite()
+            && self.colors.as_ref().is_none_or(|colors| colors[index].is_finite())
+            && self.opacities.as_ref().is_none_or(|opacities| opacities[index].is_finite())
+            && self.areas.as_ref().is_none_or(|areas| areas[index].is_finite())
+            && match &self.shapes {
+                Shapes::Discs(sizes) => sizes[index].is_finite(),
+                Shapes::Ellipses(axes) => axes[index].iter().all(|axis| axis.is_finite()),
+            };
+        if !finite {
+            return Some(Defect::NotFinite);
+        }
+        if self.normals[index] == Vec3::ZERO {
+            return Some(Defect::ZeroNormal);
+        }
+        match &self.shapes {
+            Shapes::Discs(sizes) if sizes[index] < 0.0 => Some(Defect::NegativeSize),
+            Shapes::Discs(sizes) if sizes[index] == 0.0 => Some(Defect::UnknownSize),
+            Shapes::Ellipses(axes) if axes[index][0].cross(axes[index][1]) == Vec3::ZERO => {
+                Some(Defect::ZeroNormal)
+            }
+            _ => None,
+        }
+    }
+
+    /// Least and greatest world position of the finite points, or `None` if there is none.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let finite = self.positions.iter().filter(|p| p.is_finite()).map(|p| p.as_dvec3());
+        finite
+            .fold(None, |bounds: Option<(DVec3, DVec3)>, p| {
+                Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
+            })
+            .map(|(low, high)| (self.origin + low, self.origin + high))
+    }
+
+    /// Length of the diagonal of the finite points' box, in scene units; 0 without points.
+    pub fn diagonal(&self) -> f64 {
+        self.bounds().map_or(0.0, |(low, high)| (high - low).length())
+    }
+}
+
+/// The origin for a cloud of these world positions: zero where `f32` coordinates serve as well, the median
+/// point where the cloud lies far from zero for its extent.
+///
+/// "Far" is 16 interquartile ranges; below that an offset from the median would gain no more than 4 bits, and
+/// coordinates that were `f32` in the file stay exactly what they were. Median and quartiles ignore outliers (one
+/// stray point at zero is common in map coordinates), non-finite points, and the order of the points.
+pub fn choose_origin(positions: &[DVec3]) -> DVec3 {
+    let mut median = DVec3::ZERO;
+    let mut spread: f64 = 0.0;
+    let mut values = Vec::with_capacity(positions.len());
+    for axis in 0..3 {
+        values.clear();
+        values.extend(positions.iter().filter(|p| p.is_finite()).map(|p| p[axis]));
+        if values.is_empty() {
+            return DVec3::ZERO;
+        }
+        let last = values.len() - 1;
+        let mut quantile = |rank: usize| *values.select_nth_unstable_by(rank, f64::total_cmp).1;
+        median[axis] = quantile(last / 2);
+        spread = spread.max(quantile(last - last / 4) - quantile(last / 4));
+    }
+    if median.abs().max_element() < 16.0 * spread { DVec3::ZERO } else { median }
+}

@@ -1,0 +1,154 @@
+//! The finished picture: colour, alpha and what else was asked for (AOVs).
+
+use glam::{DVec3, Vec3};
+
+/// A half-open rectangle of pixels of the full frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelRect {
+    /// First column.
+    pub x0: i32,
+    /// First row.
+    pub y0: i32,
+    /// One past the last column.
+    pub x1: i32,
+    /// One past the last row.
+    pub y1: i32,
+}
+
+impl PixelRect {
+    /// The rectangle [x0, x1) x [y0, y1).
+    pub const fn new(x0: i32, y0: i32, x1: i32, y1: i32) -> Self {
+        Self { x0, y0, x1, y1 }
+    }
+
+    /// Number of columns; 0 if there is none.
+    pub fn width(&self) -> usize {
+        (self.x1 - self.x0).max(0) as usize
+    }
+
+    /// Number of rows; 0 if there is none.
+    pub fn height(&self) -> usize {
+        (self.y1 - self.y0).max(0) as usize
+    }
+
+    /// Number of pixels.
+    pub fn area(&self) -> usize {
+        self.width() * self.height()
+    }
+
+    /// Whether no pixel is inside.
+    pub fn is_empty(&self) -> bool {
+        self.x0 >= self.x1 || self.y0 >= self.y1
+    }
+
+    /// The pixels that both rectangles have.
+    pub fn intersect(&self, other: &Self) -> Self {
+        Self {
+            x0: self.x0.max(other.x0),
+            y0: self.y0.max(other.y0),
+            x1: self.x1.min(other.x1),
+            y1: self.y1.min(other.y1),
+        }
+    }
+}
+
+/// Which arbitrary output variables are computed besides colour and alpha. What is off costs nothing.
+///
+/// The *visible layer* of a sample is the one where its transmittance falls to 1/2 or less.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct AovSelection {
+    /// [`Film::depth`].
+    pub depth: bool,
+    /// [`Film::normal`].
+    pub normal: bool,
+    /// [`Film::albedo`].
+    pub albedo: bool,
+    /// [`Film::position`].
+    pub position: bool,
+    /// [`Film::id`].
+    pub id: bool,
+    /// [`Film::coverage`].
+    pub coverage: bool,
+    /// [`Film::layers`].
+    pub layers: bool,
+    /// [`Film::samples`].
+    pub samples: bool,
+    /// [`Film::variance`].
+    pub variance: bool,
+}
+
+/// [`Film::id`] of a pixel in which no sample hits anything.
+pub const NO_ID: u32 = u32::MAX;
+
+/// A picture, or the window of one.
+///
+/// All arrays are row-major over `window`, row 0 the top one; the optional ones are `None` unless asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Width and height of the full frame, in pixels.
+    pub frame: [u32; 2],
+    /// The pixels of the frame that are here.
+    pub window: PixelRect,
+    /// Red, green, blue (linear, scene-referred, premultiplied) and alpha (coverage times opacity).
+    pub rgba: Vec<[f32; 4]>,
+    /// Depth w in camera units: mean, over the samples that have a visible layer, of that layer's weighted mean
+    /// depth; +infinity where there is none.
+    pub depth: Option<Vec<f32>>,
+    /// World-space unit normal of the visible layer, mean over the samples that have one; zero without.
+    pub normal: Option<Vec<Vec3>>,
+    /// Unlit colour of the visible layer, mean over the samples that have one; zero without.
+    pub albedo: Option<Vec<Vec3>>,
+    /// World position minus `position_origin` at the visible layer's depth, mean over the samples that have one;
+    /// zero without.
+    pub position: Option<Vec<Vec3>>,
+    /// What was subtracted from `position`: zero, unless the cloud lies so far from zero that `f32` world
+    /// coordinates would lose it.
+    pub position_origin: DVec3,
+    /// Index in the file of the front layer's heaviest fragment in the first sample that hits; [`NO_ID`] without.
+    pub id: Option<Vec<u32>>,
+    /// Mean coverage, opacity left out, in [0, 1].
+    pub coverage: Option<Vec<f32>>,
+    /// Mean number of layers a sample.
+    pub layers: Option<Vec<f32>>,
+    /// Number of samples taken.
+    pub samples: Option<Vec<f32>>,
+    /// Variance of the mean of the samples' red, green and blue (before the background); zero for one sample.
+    pub variance: Option<Vec<Vec3>>,
+}
+
+impl Film {
+    /// An empty film: transparent, nothing hit.
+    pub fn new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Self {
+        let n = window.area();
+        Self {
+            frame,
+            window,
+            rgba: vec![[0.0; 4]; n],
+            depth: aovs.depth.then(|| vec![f32::INFINITY; n]),
+            normal: aovs.normal.then(|| vec![Vec3::ZERO; n]),
+            albedo: aovs.albedo.then(|| vec![Vec3::ZERO; n]),
+            position: aovs.position.then(|| vec![Vec3::ZERO; n]),
+            position_origin: DVec3::ZERO,
+            id: aovs.id.then(|| vec![NO_ID; n]),
+            coverage: aovs.coverage.then(|| vec![0.0; n]),
+            layers: aovs.layers.then(|| vec![0.0; n]),
+            samples: aovs.samples.then(|| vec![0.0; n]),
+            variance: aovs.variance.then(|| vec![Vec3::ZERO; n]),
+        }
+    }
+
+    /// Width of the window, in pixels.
+    pub fn width(&self) -> usize {
+        self.window.width()
+    }
+
+    /// Height of the window, in pixels.
+    pub fn height(&self) -> usize {
+        self.window.height()
+    }
+
+    /// Index of the frame's pixel (x, y) in the arrays; it must lie in the window.
+    pub fn index(&self, x: i32, y: i32) -> usize {
+        (y - self.window.y0) as usize * self.width() + (x - self.window.x0) as usize
+    }
+}
