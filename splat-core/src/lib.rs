@@ -3,9 +3,25 @@
 pub mod camera;
 pub mod cloud;
 pub mod error;
+pub mod evaluate;
 pub mod film;
+pub mod fit;
+pub mod kernel;
+pub mod options;
+mod pixel;
+pub mod prepare;
+pub mod raster;
+pub mod real;
+pub mod render;
+pub mod sampling;
+pub mod setup;
+pub mod srgb;
 
 pub use camera::{Camera, Lens, Projection};
 pub use cloud::{Cloud, Defect, Shapes};
 pub use error::Error;
 pub use film::{AovSelection, Film, PixelRect};
+pub use kernel::{Kernel, TableMode};
+pub use options::{RenderOptions, Shading};
+pub use render::{Rendered, Statistics, fragments, render};
+pub use sampling::{PatternKind, PixelFilter};

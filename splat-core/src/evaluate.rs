@@ -1,0 +1,196 @@
+//! The evaluation of one sample against one splat: SPEC section 4, notes 3.4; it replaces L174-194.
+//!
+//! These few lines are the contract between the cores: + - * / and comparisons, in exactly this order, never a
+//! fused multiply-add. In `f32` they make pictures, in `f64` they are the truth.
+
+use crate::real::Real;
+use glam::DVec2;
+
+/// What the evaluation needs of a splat: the splat-centred constants of notes 3.4.
+///
+/// Lengths on the picture are in pixels, relative to the reference point's projection X0 = xi + xf, Y0 = yi + yf;
+/// u and v are in units of sigma. The (u, v) basis is rotated so that u depends on dy alone (a0 = 0).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SplatConstants<R> {
+    /// Integer part of X0, in pixels.
+    pub xi: i32,
+    /// Integer part of Y0, in pixels.
+    pub yi: i32,
+    /// Fraction of X0, in [-1/2, 1/2] pixel.
+    pub xf: R,
+    /// Fraction of Y0, in [-1/2, 1/2] pixel.
+    pub yf: R,
+    /// Slope of g, per pixel of x and of y; zero if orthographic.
+    pub h: [R; 2],
+    /// du/dy at the reference point, in sigma a pixel.
+    pub a1: R,
+    /// dv/dx and dv/dy at the reference point, in sigma a pixel.
+    pub b: [R; 2],
+    /// (u, v) of the reference point: (0, 0), or the deepest point of the splat.
+    pub reference: [R; 2],
+    /// Whether the reference point is the centre, so that a division-free test will do.
+    pub centred: bool,
+    /// Depth of the reference point, in camera units.
+    pub depth: R,
+    /// 1 / depth.
+    pub inverse_depth: R,
+    /// Depth per sigma of u and of v, in camera units.
+    pub depth_slope: [R; 2],
+    /// Lens only: a hit needs g (1 - h.q) above this. Nearer to zero the lens point all but lies in the splat's
+    /// plane, and rounding would decide. See [`crate::setup`].
+    pub edge_on: R,
+}
+
+/// Where a sample hits a splat.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit<R> {
+    /// First splat coordinate, in sigma.
+    pub u: R,
+    /// Second splat coordinate, in sigma.
+    pub v: R,
+    /// u^2 + v^2.
+    pub r2: R,
+    /// View depth w, in camera units.
+    pub depth: R,
+    /// Whether the lens point and the eye are on different sides of the splat's plane.
+    pub flipped: bool,
+}
+
+/// Which hits count, besides the kernel's cutoff.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits<R> {
+    /// F: the splat is u^2 + v^2 < cutoff.
+    pub cutoff: R,
+    /// Hits have depth > near.
+    pub near: R,
+    /// Hits have depth < far.
+    pub far: R,
+}
+
+/// A point on the lens, as it enters the evaluation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LensPoint<R> {
+    /// Lens radius times unit-disc point times pixel scale, x and y, in pixels at depth 1.
+    pub p: [R; 2],
+    /// p / focus; zero for a focus at infinity.
+    pub p_over_focus: [R; 2],
+}
+
+impl<R: Real> SplatConstants<R> {
+    /// Offset of the sample at (x + jx, y + jy) from the reference point's projection, in pixels.
+    #[inline(always)]
+    pub fn offset(&self, x: i32, y: i32, jitter: [R; 2]) -> [R; 2] {
+        [R::from_i32(x - self.xi) + (jitter[0] - self.xf), R::from_i32(y - self.yi) + (jitter[1] - self.yf)]
+    }
+
+    /// The hit of a pinhole's sample at offset `d`.
+    #[inline(always)]
+    pub fn pinhole(&self, d: [R; 2], limits: &Limits<R>) -> Option<Hit<R>> {
+        let g = R::ONE + (self.h[0] * d[0] + self.h[1] * d[1]);
+        let inside = g > R::ZERO;
+        let nu = self.a1 * d[1];
+        let nv = self.b[0] * d[0] + self.b[1] * d[1];
+        self.hit(inside, nu, nv, g, self.depth, false, limits)
+    }
+
+    /// The hit of a thin lens's sample at offset `d`, seen through the point `lens`.
+    #[inline(always)]
+    pub fn thin_lens(&self, d: [R; 2], lens: &LensPoint<R>, limits: &Limits<R>) -> Option<Hit<R>> {
+        let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
+        let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
+        let he = self.h[0] * e[0] + self.h[1] * e[1];
+        let hq = self.h[0] * q[0] + self.h[1] * q[1];
+        let g = R::ONE + he;
+        let side = R::ONE - hq;
+        let inside = g * side > self.edge_on;
+        let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
+        let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
+        let nu = self.a1 * m1;
+        let nv = self.b[0] * m0 + self.b[1] * m1;
+        self.hit(inside, nu, nv, g, self.depth * side, side < R::ZERO, limits)
+    }
+
+    /// The hit of an orthographic camera's sample at offset `d`.
+    #[inline(always)]
+    pub fn orthographic(&self, d: [R; 2], limits: &Limits<R>) -> Option<Hit<R>> {
+        let u = self.reference[0] + self.a1 * d[1];
+        let v = self.reference[1] + (self.b[0] * d[0] + self.b[1] * d[1]);
+        let r2 = u * u + v * v;
+        let depth = self.depth + (self.depth_slope[0] * u + self.depth_slope[1] * v);
+        let inside = r2 < limits.cutoff && depth > limits.near && depth < limits.far;
+        inside.then_some(Hit { u, v, r2, depth, flipped: false })
+    }
+
+    /// The common end of the perspective forms: (u, v) = reference + (nu, nv)/g, w = scaled_depth/g.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the seven quantities of one formula, inlined twice")]
+    fn hit(
+        &self,
+        inside: bool,
+        nu: R,
+        nv: R,
+        g: R,
+        scaled_depth: R,
+        flipped: bool,
+        limits: &Limits<R>,
+    ) -> Option<Hit<R>> {
+        // Without a division, while most candidates miss.
+        let inside = inside && (!self.centred || nu * nu + nv * nv < limits.cutoff * (g * g));
+        if !inside {
+            return None;
+        }
+        let inverse_g = g.recip();
+        let u = self.reference[0] + nu * inverse_g;
+        let v = self.reference[1] + nv * inverse_g;
+        let r2 = u * u + v * v;
+        let depth = scaled_depth * inverse_g;
+        let inside = (self.centred || r2 < limits.cutoff) && depth > limits.near && depth < limits.far;
+        inside.then_some(Hit { u, v, r2, depth, flipped })
+    }
+}
+
+impl SplatConstants<f64> {
+    /// Projection (X0, Y0) of the reference point, in pixels.
+    pub fn pixel(&self) -> DVec2 {
+        DVec2::new(f64::from(self.xi) + self.xf, f64::from(self.yi) + self.yf)
+    }
+
+    /// The same constants, each rounded once.
+    pub fn to_f32(&self) -> SplatConstants<f32> {
+        SplatConstants {
+            xi: self.xi,
+            yi: self.yi,
+            xf: self.xf as f32,
+            yf: self.yf as f32,
+            h: self.h.map(|value| value as f32),
+            a1: self.a1 as f32,
+            b: self.b.map(|value| value as f32),
+            reference: self.reference.map(|value| value as f32),
+            centred: self.centred,
+            depth: self.depth as f32,
+            inverse_depth: self.inverse_depth as f32,
+            depth_slope: self.depth_slope.map(|value| value as f32),
+            edge_on: self.edge_on as f32,
+        }
+    }
+}
+
+impl SplatConstants<f32> {
+    /// Whether every constant is finite.
+    pub fn is_finite(&self) -> bool {
+        [self.xf, self.yf, self.a1, self.depth, self.inverse_depth, self.edge_on]
+            .iter()
+            .chain(&self.h)
+            .chain(&self.b)
+            .chain(&self.reference)
+            .chain(&self.depth_slope)
+            .all(|value| value.is_finite())
+    }
+}
+
+impl<R: Real> Limits<R> {
+    /// Limits from exact values, each rounded once.
+    pub fn new(cutoff: f64, near: f64, far: f64) -> Self {
+        Self { cutoff: R::from_f64(cutoff), near: R::from_f64(near), far: R::from_f64(far) }
+    }
+}

@@ -1,0 +1,125 @@
+//! What the caller decides about a picture.
+
+use crate::kernel::{Kernel, TableMode};
+use crate::sampling::{PatternKind, PixelFilter};
+use crate::{AovSelection, Error, PixelRect};
+use splat_abuffer::{Coverage, Resolve, Thickness};
+use std::ops::Range;
+
+/// Everything about a picture but the cloud and the camera. The default is what `surface` wants.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderOptions {
+    /// Number of samples a pixel, 1 to [`MAX_SAMPLES`].
+    pub samples: u32,
+    /// Which of them are taken; `None` for all.
+    pub sample_range: Option<Range<u32>>,
+    /// The pixels to render; `None` for the whole frame.
+    pub window: Option<PixelRect>,
+    /// The pixel filter.
+    pub filter: PixelFilter,
+    /// The set of sample positions.
+    pub pattern: PatternKind,
+    /// Seed of the sample positions.
+    pub seed: u64,
+    /// The shape of a splat's weight.
+    pub kernel: Kernel,
+    /// F: a splat reaches to sqrt(F) sigma; greater than 0, at most 64.
+    pub cutoff: f64,
+    /// How the kernel's table is read.
+    pub table: TableMode,
+    /// How fragments become a colour.
+    pub resolve: Resolve,
+    /// c: the half thickness of a fragment, in sigma along the normal; 0 or more.
+    pub thickness: f64,
+    /// Whether splats are seen from the front only.
+    pub cull: bool,
+    /// What stands behind everything: linear red, green, blue, and alpha; `None` is transparent.
+    pub background: Option<[f32; 4]>,
+    /// How a splat gets its colour.
+    pub shading: Shading,
+    /// What is computed besides colour and alpha.
+    pub aovs: AovSelection,
+    /// Bytes that the fragments of a tile may take; a tile that needs more is split, to a pixel if need be.
+    pub tile_memory: usize,
+}
+
+/// How a splat gets its colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shading {
+    /// The cloud's colour as it is (white where it has none).
+    Color,
+    /// The cloud's colour (light grey where it has none), lit by a lamp at the eye.
+    Headlight,
+}
+
+/// Greatest number of samples a pixel.
+pub const MAX_SAMPLES: u32 = 65_536;
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            samples: 16,
+            sample_range: None,
+            window: None,
+            filter: PixelFilter::BlackmanHarris,
+            pattern: PatternKind::Sobol,
+            seed: 0,
+            kernel: Kernel::Windowed,
+            cutoff: 4.0,
+            table: TableMode::Lerp256,
+            resolve: Resolve::Surface { coverage: Coverage::Opaque, thickness: Thickness::AroundHit },
+            thickness: 0.5,
+            cull: false,
+            background: None,
+            shading: Shading::Color,
+            aovs: AovSelection::default(),
+            tile_memory: 64 << 20,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// The samples that are taken.
+    pub fn sample_range(&self) -> Range<u32> {
+        self.sample_range.clone().unwrap_or(0..self.samples)
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field, what it holds, and what it may hold.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.samples == 0 || self.samples > MAX_SAMPLES {
+            return Err(Error::invalid("samples", self.samples, "1 to 65536"));
+        }
+        if self.pattern == PatternKind::PoissonDisc && self.samples > 1024 {
+            return Err(Error::invalid(
+                "samples",
+                self.samples,
+                "at most 1024 with the Poisson-disc pattern",
+            ));
+        }
+        let range = self.sample_range();
+        if range.start >= range.end || range.end > self.samples {
+            let found = format!("{}:{}", range.start, range.end);
+            return Err(Error::invalid("sample range", found, "A:B with A < B, B at most the samples"));
+        }
+        if !(self.cutoff > 0.0 && self.cutoff <= 64.0) {
+            return Err(Error::invalid("cutoff", self.cutoff, "more than 0, at most 64"));
+        }
+        if !(self.thickness.is_finite() && self.thickness >= 0.0) {
+            return Err(Error::invalid("thickness", self.thickness, "a finite number, 0 or more"));
+        }
+        if let Resolve::Surface { coverage: Coverage::Soft { saturation }, .. } = self.resolve
+            && !(saturation.is_finite() && saturation > 0.0)
+        {
+            return Err(Error::invalid("wsat", saturation, "a finite number greater than 0"));
+        }
+        if let Some(background) = self.background
+            && !(background.iter().all(|value| value.is_finite()) && (0.0..=1.0).contains(&background[3]))
+        {
+            return Err(Error::invalid("background", format!("{background:?}"), "finite, alpha in [0, 1]"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,227 @@
+//! From the resolved samples of a pixel to the film: the mean, the background, and the AOVs. SPEC section 6.
+
+use crate::film::NO_ID;
+use crate::raster::SamplePlace;
+use crate::sampling::SampleTable;
+use crate::setup::{View, VisibleSplat, base_color};
+use crate::{AovSelection, Camera, Cloud, Film, RenderOptions, Shading, srgb};
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
+
+/// Resolves the samples of one pixel after the other.
+///
+/// Sums are in `f64`, in the order of the samples: so the mean of a part of the samples, joined with the mean of the
+/// rest, agrees with the mean of all to rounding.
+#[derive(Debug)]
+pub struct PixelResolver<'a> {
+    cloud: &'a Cloud,
+    view: &'a View,
+    to_world: DMat3,
+    aovs: AovSelection,
+    shading: Shading,
+    display_space: bool,
+    background: Option<[f32; 4]>,
+    resolver: Resolver,
+    splats: &'a [VisibleSplat],
+    surfaces: Vec<SplatSurface>,
+    sums: Sums,
+}
+
+/// What is summed over the samples of a pixel.
+#[derive(Debug, Default)]
+struct Sums {
+    samples: u32,
+    color: [f64; 3],
+    color_squared: [f64; 3],
+    transmittance: f64,
+    uncovered: f64,
+    layers: u64,
+    visible: u32,
+    depth: f64,
+    normal: DVec3,
+    albedo: DVec3,
+    position: DVec3,
+    id: Option<u32>,
+}
+
+impl<'a> PixelResolver<'a> {
+    /// A resolver for a frame with these splats, by rank.
+    pub fn new(
+        cloud: &'a Cloud,
+        camera: &Camera,
+        options: &RenderOptions,
+        view: &'a View,
+        splats: &'a [VisibleSplat],
+    ) -> Self {
+        Self {
+            cloud,
+            view,
+            to_world: camera.linear().inverse(),
+            aovs: options.aovs,
+            shading: options.shading,
+            display_space: options.resolve == Resolve::Over,
+            background: options.background,
+            resolver: Resolver::new(options.resolve),
+            surfaces: splats.iter().map(|splat| splat.surface).collect(),
+            splats,
+            sums: Sums::default(),
+        }
+    }
+
+    /// Begins a pixel.
+    pub fn start(&mut self) {
+        self.sums = Sums::default();
+    }
+
+    /// Adds the next sample, given its fragments.
+    pub fn add(&mut self, place: SamplePlace, fragments: &mut [Fragment], samples: &SampleTable) {
+        self.sums.samples += 1;
+        let sample = if fragments.is_empty() {
+            SampleColor { color: [0.0; 3], transmittance: 1.0, uncovered: 1.0 }
+        } else {
+            self.resolver.resolve(fragments, &self.surfaces)
+        };
+        for (channel, value) in sample.color.map(f64::from).into_iter().enumerate() {
+            self.sums.color[channel] += value;
+            self.sums.color_squared[channel] += value * value;
+        }
+        self.sums.transmittance += f64::from(sample.transmittance);
+        self.sums.uncovered += f64::from(sample.uncovered);
+        if !fragments.is_empty() {
+            self.add_aovs(place, fragments, samples);
+        }
+    }
+
+    /// Adds to the sums what only the AOVs need.
+    fn add_aovs(&mut self, place: SamplePlace, fragments: &[Fragment], samples: &SampleTable) {
+        let layers = self.resolver.layers();
+        self.sums.layers += layers.len() as u64;
+        if self.aovs.id && self.sums.id.is_none() && !layers.is_empty() {
+            let front = self.resolver.fragments_of(&layers[0], fragments);
+            // The first of the heaviest, in splat order.
+            let heaviest = front.reduce(|best, next| if next.weight > best.weight { next } else { best });
+            self.sums.id = heaviest.map(|fragment| self.splats[fragment.rank() as usize].index);
+        }
+        let AovSelection { depth, normal, albedo, position, .. } = self.aovs;
+        if !(depth || normal || albedo || position) {
+            return;
+        }
+        let Some(layer) = self.resolver.visible_layer() else { return };
+        let (mut weight, mut depth_sum) = (0.0, 0.0);
+        let (mut normal_sum, mut albedo_sum) = (DVec3::ZERO, DVec3::ZERO);
+        for fragment in self.resolver.fragments_of(layer, fragments) {
+            let index = self.splats[fragment.rank() as usize].index as usize;
+            let w = f64::from(fragment.weight);
+            weight += w;
+            depth_sum += w * f64::from(fragment.depth);
+            if normal {
+                normal_sum += w * self.facing_normal(index);
+            }
+            if albedo {
+                albedo_sum += w * DVec3::from(base_color(self.cloud, index, self.shading).map(f64::from));
+            }
+        }
+        let depth = depth_sum / weight;
+        self.sums.visible += 1;
+        self.sums.depth += depth;
+        self.sums.normal += normal_sum.normalize_or_zero();
+        self.sums.albedo += albedo_sum / weight;
+        if position {
+            self.sums.position += self.world_position(place, depth, samples) - self.cloud.origin;
+        }
+    }
+
+    /// The world normal of a splat; where normals do not tell the outside, the one that faces the eye.
+    fn facing_normal(&self, index: usize) -> DVec3 {
+        let normal = self.cloud.normals[index].as_dvec3();
+        if self.cloud.oriented {
+            return normal;
+        }
+        let forward = if self.view.orthographic {
+            self.view.world_forward
+        } else {
+            self.cloud.positions[index].as_dvec3() + (self.cloud.origin - self.view.eye)
+        };
+        if normal.dot(forward) > 0.0 { -normal } else { normal }
+    }
+
+    /// The world position of the point at depth `w` on a sample's ray.
+    fn world_position(&self, place: SamplePlace, w: f64, samples: &SampleTable) -> DVec3 {
+        let jitter = samples.jitter(place.x, place.y)[place.sample];
+        let pixel = DVec2::new(f64::from(place.x), f64::from(place.y)) + DVec2::from(jitter.map(f64::from));
+        let screen = (pixel - self.view.principal_point) / self.view.pixel_scale;
+        let xy = match self.view.lens {
+            _ if self.view.orthographic => screen,
+            None => screen * w,
+            Some(lens) => {
+                // The ray goes from the lens point p at depth 0 through (focus s, focus).
+                let unit = samples.unit_lens(place.x, place.y)[place.sample];
+                let p = DVec2::from(unit.map(f64::from)) * lens.radius;
+                p + (screen - p / lens.focus) * w
+            }
+        };
+        self.view.eye + self.to_world * xy.extend(w)
+    }
+
+    /// Writes the pixel's means to the film.
+    pub fn finish(&self, x: i32, y: i32, film: &mut Film) {
+        let index = film.index(x, y);
+        let sums = &self.sums;
+        let n = f64::from(sums.samples);
+        film.rgba[index] = self.pixel_color(sums.color.map(|sum| sum / n), sums.transmittance / n);
+        let visible = f64::from(sums.visible);
+        if sums.visible > 0 {
+            set(&mut film.depth, index, (sums.depth / visible) as f32);
+            set(&mut film.normal, index, (sums.normal / visible).as_vec3());
+            set(&mut film.albedo, index, (sums.albedo / visible).as_vec3());
+            set(&mut film.position, index, (sums.position / visible).as_vec3());
+        }
+        set(&mut film.id, index, sums.id.unwrap_or(NO_ID));
+        set(&mut film.coverage, index, (1.0 - sums.uncovered / n) as f32);
+        set(&mut film.layers, index, (sums.layers as f64 / n) as f32);
+        set(&mut film.samples, index, sums.samples as f32);
+        set(&mut film.variance, index, sums.variance_of_the_mean());
+    }
+
+    /// The pixel over its background: premultiplied, linear colour and alpha.
+    fn pixel_color(&self, color: [f64; 3], transmittance: f64) -> [f32; 4] {
+        let mut rgba = [color[0], color[1], color[2], 1.0 - transmittance];
+        if let Some([red, green, blue, alpha]) = self.background {
+            let weight = transmittance * f64::from(alpha);
+            for (value, behind) in rgba.iter_mut().zip([red, green, blue]) {
+                let behind = if self.display_space { srgb::encode(behind) } else { behind };
+                *value += weight * f64::from(behind);
+            }
+            rgba[3] += weight;
+        }
+        let [red, green, blue, alpha] = rgba.map(|value| value as f32);
+        if self.display_space && alpha > 0.0 {
+            // Blended as trained, in the display's space; linear from here on.
+            let [red, green, blue] = [red, green, blue].map(|value| srgb::decode(value / alpha) * alpha);
+            return [red, green, blue, alpha];
+        }
+        [red, green, blue, alpha]
+    }
+}
+
+impl Sums {
+    /// Variance of the mean colour, per channel; zero for a single sample.
+    fn variance_of_the_mean(&self) -> Vec3 {
+        if self.samples < 2 {
+            return Vec3::ZERO;
+        }
+        let n = f64::from(self.samples);
+        let variance = [0, 1, 2].map(|channel| {
+            let sum = self.color[channel];
+            ((self.color_squared[channel] - sum * sum / n) / (n * (n - 1.0))).max(0.0) as f32
+        });
+        Vec3::from(variance)
+    }
+}
+
+/// Sets a pixel of a channel that may not be there.
+fn set<T>(channel: &mut Option<Vec<T>>, index: usize, value: T) {
+    if let Some(values) = channel {
+        values[index] = value;
+    }
+}

@@ -1,0 +1,122 @@
+//! Candidates of a splat against the evaluation: the rasterization loop (L164-203).
+
+use crate::evaluate::{Hit, LensPoint, Limits};
+use crate::kernel::KernelTable;
+use crate::sampling::SampleTable;
+use crate::setup::{View, VisibleSplat};
+use crate::{PixelRect, RenderOptions};
+use splat_abuffer::Fragment;
+use std::ops::Range;
+
+/// What is the same for all splats of a frame.
+#[derive(Debug)]
+pub struct Rasterizer {
+    samples: SampleTable,
+    range: Range<usize>,
+    limits: Limits<f32>,
+    table: KernelTable,
+    form: Form,
+    cull: bool,
+}
+
+/// Which form of the evaluation the camera needs.
+#[derive(Debug, Clone, Copy)]
+enum Form {
+    Pinhole,
+    ThinLens,
+    Orthographic,
+}
+
+/// Where a fragment falls: pixel of the full frame, and sample of the pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SamplePlace {
+    /// Column.
+    pub x: i32,
+    /// Row.
+    pub y: i32,
+    /// Index of the sample.
+    pub sample: usize,
+}
+
+impl Rasterizer {
+    /// The rasterizer of a view with checked options.
+    pub fn new(view: &View, options: &RenderOptions) -> Self {
+        let range = options.sample_range();
+        Self {
+            samples: SampleTable::new(options, view.lens, view.pixel_scale),
+            range: range.start as usize..range.end as usize,
+            limits: Limits::new(view.cutoff, view.near, view.far),
+            table: KernelTable::new(options.kernel, options.cutoff, options.table),
+            form: match (view.orthographic, view.lens) {
+                (true, _) => Form::Orthographic,
+                (false, None) => Form::Pinhole,
+                (false, Some(_)) => Form::ThinLens,
+            },
+            cull: options.cull,
+        }
+    }
+
+    /// The sample positions.
+    pub fn samples(&self) -> &SampleTable {
+        &self.samples
+    }
+
+    /// The indices of the samples that are taken.
+    pub fn range(&self) -> Range<usize> {
+        self.range.clone()
+    }
+
+    /// Tests every sample of the pixels of `region` against a splat, and gives the fragments to the sink. The region
+    /// need not lie within the splat's candidates. Returns the number of tests.
+    pub fn rasterize(
+        &self,
+        splat: &VisibleSplat,
+        rank: u32,
+        region: &PixelRect,
+        sink: &mut impl FnMut(SamplePlace, Fragment),
+    ) -> u64 {
+        let constants = &splat.constants;
+        match self.form {
+            Form::Pinhole => {
+                self.visit(splat, rank, region, sink, |d, _| constants.pinhole(d, &self.limits));
+            }
+            Form::ThinLens => {
+                self.visit(splat, rank, region, sink, |d, lens| {
+                    constants.thin_lens(d, &lens[0], &self.limits)
+                });
+            }
+            Form::Orthographic => {
+                self.visit(splat, rank, region, sink, |d, _| constants.orthographic(d, &self.limits));
+            }
+        }
+        region.area() as u64 * self.range.len() as u64
+    }
+
+    /// The loop itself; `evaluate` gets the sample's offset and the lens points from its own one on.
+    #[inline(always)]
+    fn visit(
+        &self,
+        splat: &VisibleSplat,
+        rank: u32,
+        region: &PixelRect,
+        sink: &mut impl FnMut(SamplePlace, Fragment),
+        evaluate: impl Fn([f32; 2], &[LensPoint<f32>]) -> Option<Hit<f32>>,
+    ) {
+        for y in region.y0..region.y1 {
+            for x in region.x0..region.x1 {
+                let jitter = self.samples.jitter(x, y);
+                let lens = self.samples.lens(x, y);
+                for sample in self.range.clone() {
+                    let offset = splat.constants.offset(x, y, jitter[sample]);
+                    let Some(hit) = evaluate(offset, lens.get(sample..).unwrap_or(&[])) else { continue };
+                    let back = splat.back != (hit.flipped && splat.flips);
+                    let weight = splat.weight_scale * self.table.weight(hit.r2);
+                    let fragment = Fragment::new(hit.depth, weight, rank, back);
+                    if fragment.is_admitted() && !(self.cull && back) {
+                        sink(SamplePlace { x, y, sample }, fragment);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! From a cloud to a picture: set-up, tiles, A-buffer, resolve, film.
+
+use crate::pixel::PixelResolver;
+use crate::raster::{Rasterizer, SamplePlace};
+use crate::setup::{SetUp, View, VisibleSplat, set_up};
+use crate::{Camera, Cloud, Error, Film, PixelRect, RenderOptions};
+use splat_abuffer::{Fragment, TileBuffer};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// Side of a tile, in pixels: that of the selection table.
+const TILE: i32 = crate::sampling::SELECTION_SIZE as i32;
+
+/// A finished picture, and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rendered {
+    /// The picture.
+    pub film: Film,
+    /// What it took.
+    pub statistics: Statistics,
+}
+
+/// What a picture took. Times of one thread.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Statistics {
+    /// Splats of the cloud that were never rendered, by cause.
+    pub dropped: BTreeMap<&'static str, usize>,
+    /// Splats that were rasterised.
+    pub drawn: usize,
+    /// Samples tested against a splat.
+    pub tests: u64,
+    /// Fragments resolved.
+    pub fragments: u64,
+    /// Samples resolved.
+    pub samples: u64,
+    /// Time of set-up.
+    pub setup: Duration,
+    /// Time of sorting splats into tiles.
+    pub bin: Duration,
+    /// Time of making fragments.
+    pub raster: Duration,
+    /// Time of resolving them.
+    pub resolve: Duration,
+}
+
+/// Renders a cloud. `progress` is told the finished part of the picture, from 0 to 1, now and then.
+///
+/// The cloud must have normals, and sizes and areas if the picture is to be free of holes: see
+/// [`crate::prepare::prepare`].
+///
+/// # Errors
+/// If the camera, the options or the cloud's arrays are out of range. Bad points are no error; they are counted.
+pub fn render(
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Rendered, Error> {
+    let frame = Frame::new(cloud, camera, options)?;
+    let window = frame.view.window;
+    let start = Instant::now();
+    let tiles = bin(&frame.set_up.splats, &window);
+    let mut picture = Picture {
+        frame: &frame,
+        film: Film::new([camera.width, camera.height], window, options.aovs),
+        pixels: PixelResolver::new(cloud, camera, options, &frame.view, &frame.set_up.splats),
+        buffer: TileBuffer::default(),
+        budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
+        statistics: Statistics {
+            dropped: frame.set_up.dropped.clone(),
+            drawn: frame.set_up.splats.len(),
+            setup: frame.set_up_time,
+            bin: start.elapsed(),
+            ..Statistics::default()
+        },
+    };
+    picture.film.position_origin = cloud.origin;
+    let count = tiles.len();
+    for (number, (region, ranks)) in tiles.into_iter().enumerate() {
+        progress(number as f64 / count as f64);
+        picture.render_region(&region, &ranks);
+    }
+    progress(1.0);
+    Ok(Rendered { film: picture.film, statistics: picture.statistics })
+}
+
+/// Gives every fragment of a picture to `sink`, splat by splat in splat order: its place, its splat's index in the
+/// cloud, and the fragment. Returns the number of samples tested.
+///
+/// # Errors
+/// As [`render`].
+pub fn fragments(
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
+) -> Result<u64, Error> {
+    let frame = Frame::new(cloud, camera, options)?;
+    let splats = frame.set_up.splats.iter().enumerate();
+    Ok(splats
+        .map(|(rank, splat)| {
+            let mut sink = |place, fragment| sink(place, splat.index, fragment);
+            frame.rasterizer.rasterize(splat, rank as u32, &splat.bounds, &mut sink)
+        })
+        .sum())
+}
+
+/// Everything that is ready before the first fragment.
+struct Frame {
+    view: View,
+    set_up: SetUp,
+    set_up_time: Duration,
+    rasterizer: Rasterizer,
+}
+
+impl Frame {
+    fn new(cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<Self, Error> {
+        camera.check()?;
+        options.check()?;
+        cloud.check_lengths()?;
+        if cloud.normals.len() != cloud.len() {
+            return Err(Error::Length { what: "normals", found: 0, expected: cloud.len() });
+        }
+        let view = View::new(camera, options);
+        if view.window.is_empty() {
+            return Err(Error::invalid("crop", format!("{:?}", options.window), "a part of the frame"));
+        }
+        let start = Instant::now();
+        let set_up = set_up(cloud, &view, options);
+        let set_up_time = start.elapsed();
+        let rasterizer = Rasterizer::new(&view, options);
+        Ok(Self { view, set_up, set_up_time, rasterizer })
+    }
+}
+
+/// The tiles of a window, each with the ranks of the splats that may leave fragments in it, in splat order. The grid
+/// starts at the frame's corner, whatever the window.
+fn bin(splats: &[VisibleSplat], window: &PixelRect) -> Vec<(PixelRect, Vec<u32>)> {
+    let first = [window.x0.div_euclid(TILE), window.y0.div_euclid(TILE)];
+    let columns = (window.x1 - 1).div_euclid(TILE) - first[0] + 1;
+    let rows = (window.y1 - 1).div_euclid(TILE) - first[1] + 1;
+    let mut tiles: Vec<(PixelRect, Vec<u32>)> = (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| (column, row)))
+        .map(|(column, row)| {
+            let [x, y] = [(first[0] + column) * TILE, (first[1] + row) * TILE];
+            (PixelRect::new(x, y, x + TILE, y + TILE).intersect(window), Vec::new())
+        })
+        .collect();
+    for (rank, splat) in splats.iter().enumerate() {
+        let bounds = &splat.bounds;
+        for row in bounds.y0.div_euclid(TILE)..=(bounds.y1 - 1).div_euclid(TILE) {
+            for column in bounds.x0.div_euclid(TILE)..=(bounds.x1 - 1).div_euclid(TILE) {
+                tiles[((row - first[1]) * columns + column - first[0]) as usize].1.push(rank as u32);
+            }
+        }
+    }
+    tiles
+}
+
+/// A picture in the making.
+struct Picture<'a> {
+    frame: &'a Frame,
+    film: Film,
+    pixels: PixelResolver<'a>,
+    buffer: TileBuffer,
+    /// Fragments that a tile may hold.
+    budget: usize,
+    statistics: Statistics,
+}
+
+impl Picture<'_> {
+    /// Renders a tile, or a part of one. A region whose fragments exceed the budget is split into four; a single
+    /// pixel gets what it needs.
+    fn render_region(&mut self, region: &PixelRect, ranks: &[u32]) {
+        let start = Instant::now();
+        let complete = self.collect(region, ranks);
+        self.statistics.raster += start.elapsed();
+        if complete {
+            let start = Instant::now();
+            self.resolve(region);
+            self.statistics.resolve += start.elapsed();
+        } else {
+            for quarter in quarters(region) {
+                self.render_region(&quarter, ranks);
+            }
+        }
+    }
+
+    /// Fills the buffer with the region's fragments. Stops and returns false where they exceed the budget.
+    fn collect(&mut self, region: &PixelRect, ranks: &[u32]) -> bool {
+        let rasterizer = &self.frame.rasterizer;
+        let range = rasterizer.range();
+        self.buffer.clear(region.area() * range.len());
+        let buffer = &mut self.buffer;
+        let mut tests = 0;
+        for &rank in ranks {
+            let splat = &self.frame.set_up.splats[rank as usize];
+            let candidates = splat.bounds.intersect(region);
+            tests += rasterizer.rasterize(splat, rank, &candidates, &mut |place, fragment| {
+                buffer.push(local_sample(region, place, range.len(), range.start), fragment);
+            });
+            if buffer.len() > self.budget && region.area() > 1 {
+                return false;
+            }
+        }
+        self.statistics.tests += tests;
+        self.statistics.fragments += buffer.len() as u64;
+        true
+    }
+
+    /// Resolves the region's samples into the film.
+    fn resolve(&mut self, region: &PixelRect) {
+        self.buffer.group();
+        let rasterizer = &self.frame.rasterizer;
+        let range = rasterizer.range();
+        for y in region.y0..region.y1 {
+            for x in region.x0..region.x1 {
+                self.pixels.start();
+                for sample in range.clone() {
+                    let place = SamplePlace { x, y, sample };
+                    let fragments = self.buffer.sample(local_sample(region, place, range.len(), range.start));
+                    self.pixels.add(place, fragments, rasterizer.samples());
+                }
+                self.pixels.finish(x, y, &mut self.film);
+            }
+        }
+        self.statistics.samples += region.area() as u64 * range.len() as u64;
+    }
+}
+
+/// Index of a sample within a region.
+fn local_sample(region: &PixelRect, place: SamplePlace, samples: usize, first_sample: usize) -> usize {
+    let pixel = (place.y - region.y0) as usize * region.width() + (place.x - region.x0) as usize;
+    pixel * samples + place.sample - first_sample
+}
+
+/// The four quarters of a region of more than one pixel; the empty ones left out.
+fn quarters(region: &PixelRect) -> impl Iterator<Item = PixelRect> {
+    let PixelRect { x0, y0, x1, y1 } = *region;
+    let [x, y] = [x0 + (x1 - x0 + 1) / 2, y0 + (y1 - y0 + 1) / 2];
+    [
+        PixelRect::new(x0, y0, x, y),
+        PixelRect::new(x, y0, x1, y),
+        PixelRect::new(x0, y, x, y1),
+        PixelRect::new(x, y, x1, y1),
+    ]
+    .into_iter()
+    .filter(|quarter| !quarter.is_empty())
+}

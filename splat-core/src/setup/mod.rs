@@ -1,0 +1,336 @@
+//! Set-up, once per splat, in `f64`: SPEC section 3; it replaces L45-159 of the listing.
+//!
+//! One implementation serves every core, so that they agree on what they draw by construction.
+
+mod bounds;
+mod error_bound;
+mod margin;
+mod projection;
+mod view;
+
+pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
+pub use error_bound::{EPSILON, ErrorBound};
+pub use view::View;
+
+use crate::evaluate::SplatConstants;
+use crate::options::Shading;
+use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
+use glam::{DVec3, Vec3};
+use margin::margin;
+use splat_abuffer::{MAX_RANK, Resolve, SplatSurface, Thickness};
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+/// Colours and weights beyond this are clamped to it, so that no sum of a layer overflows `f32`.
+const MAX_MAGNITUDE: f32 = 1e9;
+
+/// Boxes are widened by this, in pixels, besides the margin for rounding: they only propose candidates.
+const BOX_PADDING: f64 = 1.0 / 64.0;
+
+/// Linear colour of splats without one: white as a plain colour, light grey under the headlight.
+const UNCOLORED: [f32; 3] = [1.0; 3];
+const UNCOLORED_LIT: [f32; 3] = [0.7; 3];
+
+/// Light that reaches a surface seen edge-on, relative to one that faces the headlight.
+const HEADLIGHT_AMBIENT: f64 = 0.12;
+
+/// A splat in camera space, in `f64`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraSplat {
+    /// Its centre.
+    pub center: DVec3,
+    /// Its sigma-scaled tangent axes.
+    pub axes: [DVec3; 2],
+    /// Its unit normal.
+    pub normal: DVec3,
+    /// Whether the eye sees its back.
+    pub back: bool,
+}
+
+/// A splat that may leave fragments in the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VisibleSplat {
+    /// What the evaluation needs.
+    pub constants: SplatConstants<f32>,
+    /// The pixels in which it may be hit; never empty.
+    pub bounds: PixelRect,
+    /// Its index in the cloud.
+    pub index: u32,
+    /// Factor from the kernel's value to the fragment's weight.
+    pub weight_scale: f32,
+    /// Whether the eye sees its back.
+    pub back: bool,
+    /// Whether its facing depends on where it is seen from: its normal tells the outside from the inside.
+    pub flips: bool,
+    /// Its nearest depth, in camera units: the key of splat order.
+    pub nearest: f64,
+    /// What its fragments share.
+    pub surface: SplatSurface,
+}
+
+/// The result of set-up.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SetUp {
+    /// The splats that may be seen, in splat order: a splat's place here is its rank.
+    pub splats: Vec<VisibleSplat>,
+    /// Splats that were never rendered, by cause: [`crate::Defect::name`], or `edge_on`.
+    pub dropped: BTreeMap<&'static str, usize>,
+}
+
+/// The cause of dropping a splat whose projection has no area that `f32` could tell.
+const EDGE_ON: &str = "edge_on";
+
+/// Sets up every splat of a cloud whose normals are known.
+pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
+    let mut result = SetUp::default();
+    for index in 0..cloud.len().min(MAX_RANK as usize) {
+        if let Some(defect) = cloud.defect(index) {
+            *result.dropped.entry(defect.name()).or_default() += 1;
+            continue;
+        }
+        match set_up_splat(cloud, index, view, options) {
+            Outcome::Visible(splat) => result.splats.push(splat),
+            Outcome::EdgeOn => *result.dropped.entry(EDGE_ON).or_default() += 1,
+            Outcome::Culled => {}
+        }
+    }
+    result.splats.sort_unstable_by(|a, b| splat_order(cloud, a, b));
+    result
+}
+
+/// What becomes of a splat.
+enum Outcome {
+    Visible(VisibleSplat),
+    EdgeOn,
+    Culled,
+}
+
+/// Sets up one splat without a defect.
+fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOptions) -> Outcome {
+    let splat = camera_splat(cloud, index, view);
+    let radius = view.cutoff.sqrt();
+    if (options.cull && faces_away(&splat, view)) || view.is_clipped(&splat, radius) {
+        return Outcome::Culled;
+    }
+    let Some(exact) = projection::project(&splat, view) else { return Outcome::EdgeOn };
+    let depth = view.depth_extent(&splat, radius);
+    let Some(usual) = screen_box(&splat, radius * (1.0 + margin::USUAL), view) else {
+        return Outcome::Culled;
+    };
+    let reach = view.reach(exact.pixel(), &usual);
+    let Some(margin) = margin(&splat, &exact, depth, reach, view) else { return Outcome::EdgeOn };
+    let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::Culled };
+    let bounds = view.candidates(&screen);
+    if bounds.is_empty() {
+        return Outcome::Culled;
+    }
+    let constants = SplatConstants { edge_on: margin.edge_on, ..exact }.to_f32();
+    if !constants.is_finite() {
+        return Outcome::EdgeOn;
+    }
+    Outcome::Visible(VisibleSplat {
+        constants,
+        bounds,
+        index: index as u32,
+        weight_scale: weight_scale(cloud, index, options),
+        back: splat.back,
+        flips: cloud.oriented,
+        nearest: splat.center.z - half_depth(&splat, radius),
+        surface: surface(cloud, index, &splat, view, options),
+    })
+}
+
+/// A splat of the cloud in camera space (L46-69). The camera's position is subtracted in `f64`.
+pub fn camera_splat(cloud: &Cloud, index: usize, view: &View) -> CameraSplat {
+    let from_eye = cloud.positions[index].as_dvec3() + (cloud.origin - view.eye);
+    let normal = cloud.normals[index].as_dvec3().normalize();
+    let world_axes = world_axes(cloud, index, normal);
+    let axes = world_axes.map(|axis| view.linear * axis);
+    // (A t1) x (A t2) = det(A) A^-T (t1 x t2): it points along the normal unless exactly one of these is mirrored.
+    let mirrored = (view.mirrors) != (world_axes[0].cross(world_axes[1]).dot(normal) < 0.0);
+    let cross = axes[0].cross(axes[1]).normalize();
+    let to_viewer = if view.orthographic { -view.world_forward } else { -from_eye };
+    CameraSplat {
+        center: view.linear * from_eye,
+        axes,
+        normal: if mirrored { -cross } else { cross },
+        back: cloud.oriented && normal.dot(to_viewer) < 0.0,
+    }
+}
+
+/// The sigma-scaled tangent axes of a splat in the world (L54-61).
+fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 2] {
+    match &cloud.shapes {
+        Shapes::Discs(sizes) => {
+            let size = f64::from(sizes[index]);
+            let tu = perpendicular(normal).normalize();
+            [size * tu, size * normal.cross(tu)]
+        }
+        Shapes::Ellipses(axes) => axes[index].map(|axis| axis.as_dvec3()),
+    }
+}
+
+/// A vector perpendicular to a unit vector, made with the coordinate axis that is farthest from it.
+fn perpendicular(normal: DVec3) -> DVec3 {
+    let [x, y, z] = normal.abs().to_array();
+    let axis = if x <= y && x <= z {
+        DVec3::X
+    } else if y <= z {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    axis.cross(normal)
+}
+
+/// The back-face cull (L49-52), corrected for the lens: no point of the aperture sees the front (erratum E21).
+fn faces_away(splat: &CameraSplat, view: &View) -> bool {
+    if !splat.back {
+        return false;
+    }
+    let lens_radius = view.lens.map_or(0.0, |lens| lens.radius);
+    -splat.normal.dot(splat.center) + lens_radius * splat.normal.x.hypot(splat.normal.y) < 0.0
+        || view.orthographic
+}
+
+/// The exact box of a disc of `radius` sigma on the picture, blur and pixel filter left out: `[x, y]` in pixels,
+/// widened by the circle of confusion (L137-147, corrected).
+fn screen_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 2]> {
+    let blur = view.circle_of_confusion(view.depth_extent(splat, radius));
+    let side = |axis: usize| {
+        let extent = if view.orthographic {
+            Some(orthographic_extent(splat, radius, axis))
+        } else {
+            perspective_extent(splat, radius, view.box_near(), axis)
+        };
+        extent.map(|extent| Extent {
+            min: (extent.min - blur) * view.pixel_scale[axis] + view.principal_point[axis],
+            max: (extent.max + blur) * view.pixel_scale[axis] + view.principal_point[axis],
+        })
+    };
+    Some([side(0)?, side(1)?])
+}
+
+/// The factor from the kernel's value to a fragment's weight: area / (|T1 x T2| I), so that the weights of a
+/// closed surface sum to about 1. SPEC section 4. The kernel's own value counts for `disc`, for `over`, and where
+/// no area is known.
+fn weight_scale(cloud: &Cloud, index: usize, options: &RenderOptions) -> f32 {
+    match (&cloud.areas, options.resolve, options.kernel) {
+        (Some(areas), Resolve::Surface { .. }, kernel) if kernel != crate::Kernel::Disc => {
+            let scale =
+                f64::from(areas[index]) / (splat_area(cloud, index) * kernel.integral(options.cutoff));
+            (scale as f32).min(MAX_MAGNITUDE)
+        }
+        _ => 1.0,
+    }
+}
+
+/// |T1 x T2| of a splat, in squared scene units.
+pub(crate) fn splat_area(cloud: &Cloud, index: usize) -> f64 {
+    match &cloud.shapes {
+        Shapes::Discs(sizes) => f64::from(sizes[index]).powi(2),
+        Shapes::Ellipses(axes) => {
+            let [t1, t2] = axes[index].map(|axis| axis.as_dvec3());
+            t1.cross(t2).length()
+        }
+    }
+}
+
+/// What the splat's fragments share: its colour (the listing's splat shader, L161-162), opacity and depth interval.
+fn surface(
+    cloud: &Cloud,
+    index: usize,
+    splat: &CameraSplat,
+    view: &View,
+    options: &RenderOptions,
+) -> SplatSurface {
+    let shade = match options.shading {
+        Shading::Color => 1.0,
+        Shading::Headlight => {
+            let to_viewer = if view.orthographic { DVec3::Z } else { splat.center.normalize() };
+            HEADLIGHT_AMBIENT + (1.0 - HEADLIGHT_AMBIENT) * splat.normal.dot(to_viewer).abs()
+        }
+    };
+    let color = base_color(cloud, index, options.shading).map(|value| {
+        let value = (value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE);
+        // Trained splats blend in their display space.
+        if options.resolve == Resolve::Over { srgb::encode(value) } else { value }
+    });
+    let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
+    SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }
+}
+
+/// The unlit, linear colour of a splat.
+pub fn base_color(cloud: &Cloud, index: usize, shading: Shading) -> [f32; 3] {
+    match (&cloud.colors, shading) {
+        (Some(colors), _) => colors[index].to_array(),
+        (None, Shading::Color) => UNCOLORED,
+        (None, Shading::Headlight) => UNCOLORED_LIT,
+    }
+}
+
+/// [`SplatSurface::interval`]: SPEC section 6, or the listing's (L128-133, corrected: erratum E1).
+fn depth_interval(splat: &CameraSplat, view: &View, options: &RenderOptions) -> [f32; 2] {
+    let extent = half_depth(splat, view.cutoff.sqrt());
+    if let Resolve::Surface { thickness: Thickness::WholeSplat, .. } = options.resolve {
+        return [(splat.center.z - extent) as f32, (splat.center.z + extent) as f32];
+    }
+    let sigma = splat.axes[0].cross(splat.axes[1]).length().sqrt();
+    let half = options.thickness * sigma;
+    let cap = extent + half;
+    if view.orthographic {
+        // Constant over the splat: the slope must not limit it.
+        return [f32::INFINITY, (half / splat.normal.z.abs()).min(cap) as f32];
+    }
+    // n.P is the same for every point P of the plane, the reference point among them.
+    [(half / splat.normal.dot(splat.center).abs()) as f32, cap as f32]
+}
+
+/// Splat order: by nearest depth, then by the splat's own data, so that the order in the file changes nothing.
+fn splat_order(cloud: &Cloud, a: &VisibleSplat, b: &VisibleSplat) -> Ordering {
+    a.nearest.total_cmp(&b.nearest).then_with(|| {
+        let (a, b) = (a.index as usize, b.index as usize);
+        compare(cloud.positions[a], cloud.positions[b])
+            .then_with(|| compare(cloud.normals[a], cloud.normals[b]))
+            .then_with(|| match &cloud.shapes {
+                Shapes::Discs(sizes) => sizes[a].total_cmp(&sizes[b]),
+                Shapes::Ellipses(axes) => {
+                    compare(axes[a][0], axes[b][0]).then_with(|| compare(axes[a][1], axes[b][1]))
+                }
+            })
+            .then_with(|| cloud.colors.as_ref().map_or(Ordering::Equal, |c| compare(c[a], c[b])))
+            .then_with(|| cloud.opacities.as_ref().map_or(Ordering::Equal, |o| o[a].total_cmp(&o[b])))
+            .then_with(|| cloud.areas.as_ref().map_or(Ordering::Equal, |s| s[a].total_cmp(&s[b])))
+            // Equal in everything: interchangeable in the picture, told apart only by the id.
+            .then(a.cmp(&b))
+    })
+}
+
+/// A total order of vectors, component by component.
+fn compare(a: Vec3, b: Vec3) -> Ordering {
+    let pairs = a.to_array().into_iter().zip(b.to_array());
+    pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+}
+
+/// The map from world space to a splat's own coordinates (u, v).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InverseShape {
+    u: DVec3,
+    v: DVec3,
+}
+
+impl InverseShape {
+    /// The map of a splat without a defect: the dual basis of its axes in its plane.
+    pub(crate) fn new(cloud: &Cloud, index: usize) -> Self {
+        let normal = cloud.normals[index].as_dvec3().normalize();
+        let [t1, t2] = world_axes(cloud, index, normal);
+        let cross = t1.cross(t2);
+        let length_squared = cross.length_squared();
+        Self { u: t2.cross(cross) / length_squared, v: cross.cross(t1) / length_squared }
+    }
+
+    /// u^2 + v^2 at an offset from the splat's centre; the component along the normal does not count.
+    pub(crate) fn r2(&self, offset: DVec3) -> f64 {
+        self.u.dot(offset).powi(2) + self.v.dot(offset).powi(2)
+    }
+}

@@ -1,0 +1,77 @@
+//! The splat-centred constants of a splat: SPEC section 3, notes 3.4; they replace L86-106.
+
+use super::bounds::{deep_reference, half_depth};
+use super::{CameraSplat, View};
+use crate::evaluate::SplatConstants;
+use glam::{DVec2, Vec3Swizzles};
+
+/// Below this ratio of |det J| to the product of its rows a splat is seen edge-on, and dropped.
+const EDGE_ON: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// A reference point farther than this from pixel 0 (in pixels) does not fit the integer part of the offset.
+const MAX_PIXEL: f64 = (1u64 << 30) as f64;
+
+/// The constants of a splat, exact to `f64`. `None` if it is seen edge-on.
+///
+/// [`SplatConstants::edge_on`] is left at 0; the margin of the candidates' box decides it.
+pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> {
+    let [t1, t2] = splat.axes;
+    let scale = view.pixel_scale;
+    let radius = view.cutoff.sqrt();
+    let deep =
+        if view.orthographic { None } else { deep_reference(splat, radius, half_depth(splat, radius)) };
+    let [u, v] = deep.unwrap_or([0.0; 2]);
+    let point = splat.center + u * t1 + v * t2;
+
+    // J, the Jacobian of the projection at the reference point; its rows are d(pixel)/du and d(pixel)/dv.
+    let (screen, rows) = if view.orthographic {
+        (point.xy(), [t1.xy() * scale, t2.xy() * scale])
+    } else {
+        let screen = point.xy() / point.z;
+        (screen, [t1, t2].map(|t| (t.xy() - screen * t.z) * scale / point.z))
+    };
+    let determinant = rows[0].perp_dot(rows[1]);
+    let has_area = determinant.abs() > EDGE_ON * rows[0].length() * rows[1].length();
+    if !has_area {
+        return None;
+    }
+
+    // Rotate the basis by the (c, s) that makes the new second row horizontal: J' = [[p, q], [m, 0]]. Then
+    // u = dy / q depends on dy alone, and v = (dx - u p) / m. r2 does not change.
+    let q = rows[0].y.hypot(rows[1].y);
+    let [c, s] = [rows[0].y / q, rows[1].y / q];
+    let rotate = |first: f64, second: f64| [c * first + s * second, c * second - s * first];
+    let p = rotate(rows[0].x, rows[1].x)[0];
+    let m = -determinant / q;
+    let a1 = 1.0 / q;
+    let b = [1.0 / m, -p / (q * m)];
+    let depth_slope = rotate(t1.z, t2.z);
+    let h = if view.orthographic {
+        [0.0; 2]
+    } else {
+        [-b[0] * depth_slope[1] / point.z, -(a1 * depth_slope[0] + b[1] * depth_slope[1]) / point.z]
+    };
+
+    let pixel = screen * scale + view.principal_point;
+    let whole: DVec2 = (pixel + 0.5).floor();
+    let fits = whole.abs().max_element() < MAX_PIXEL;
+    if !fits {
+        return None;
+    }
+    let fraction = pixel - whole;
+    Some(SplatConstants {
+        xi: whole.x as i32,
+        yi: whole.y as i32,
+        xf: fraction.x,
+        yf: fraction.y,
+        h,
+        a1,
+        b,
+        reference: rotate(u, v),
+        centred: deep.is_none(),
+        depth: point.z,
+        inverse_depth: if view.orthographic { 0.0 } else { 1.0 / point.z },
+        depth_slope,
+        edge_on: 0.0,
+    })
+}

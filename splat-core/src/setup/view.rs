@@ -1,0 +1,130 @@
+//! What set-up needs of camera and options, computed once a frame.
+
+use super::bounds::{Extent, half_depth};
+use super::{BOX_PADDING, CameraSplat};
+use crate::{Camera, Lens, PixelRect, RenderOptions};
+use glam::{DMat3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
+
+/// A camera as set-up sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// World position of the eye.
+    pub eye: DVec3,
+    /// World to camera, without the translation.
+    pub linear: DMat3,
+    /// Whether `linear` mirrors.
+    pub mirrors: bool,
+    /// World direction of growing depth along a ray (orthographic), not normalised.
+    pub world_forward: DVec3,
+    /// Whether all rays are parallel.
+    pub orthographic: bool,
+    /// Pixels a unit of x/w, or of x.
+    pub pixel_scale: DVec2,
+    /// Principal point, in pixels.
+    pub principal_point: DVec2,
+    /// The lens, if any.
+    pub lens: Option<Lens>,
+    /// Least depth, in camera units.
+    pub near: f64,
+    /// Greatest depth, in camera units; may be infinite.
+    pub far: f64,
+    /// F.
+    pub cutoff: f64,
+    /// Radius of the pixel filter, in pixels.
+    pub filter_radius: f64,
+    /// The pixels to render.
+    pub window: PixelRect,
+    clip_planes: Vec<DVec4>,
+}
+
+impl View {
+    /// The view of a checked camera with checked options.
+    pub fn new(camera: &Camera, options: &RenderOptions) -> Self {
+        let linear = camera.linear();
+        let frame = PixelRect::new(0, 0, camera.width as i32, camera.height as i32);
+        // A plane n.p + d over world points is n'.q + d' over camera points q = M p, (n', d') = M^-T (n, d).
+        let to_camera = camera.world_to_camera.inverse().transpose();
+        Self {
+            eye: camera.eye(),
+            linear,
+            mirrors: linear.determinant() < 0.0,
+            world_forward: linear.inverse() * DVec3::Z,
+            orthographic: camera.is_orthographic(),
+            pixel_scale: camera.pixel_scale(),
+            principal_point: camera.principal_point,
+            lens: camera.lens(),
+            near: camera.near,
+            far: camera.far,
+            cutoff: options.cutoff,
+            filter_radius: options.filter.radius(),
+            window: options.window.map_or(frame, |window| window.intersect(&frame)),
+            clip_planes: camera.clip_planes.iter().map(|&plane| to_camera * plane).collect(),
+        }
+    }
+
+    /// The largest coordinate of a sample relative to its pixel's corner, in pixels.
+    pub fn max_jitter(&self) -> f64 {
+        self.filter_radius + 0.5
+    }
+
+    /// The near plane that boxes are clipped at: a little in front, since a hit's depth is rounded.
+    pub(super) fn box_near(&self) -> f64 {
+        self.near * (1.0 - 1.0 / 65_536.0)
+    }
+
+    /// Where a point of camera space falls on the picture, in pixels.
+    pub fn project(&self, point: DVec3) -> DVec2 {
+        let screen = if self.orthographic { point.xy() } else { point.xy() / point.z };
+        screen * self.pixel_scale + self.principal_point
+    }
+
+    /// Whether the splat lies wholly outside one of the planes: near, far, and the caller's (L71-84).
+    pub(super) fn is_clipped(&self, splat: &CameraSplat, radius: f64) -> bool {
+        let extent = half_depth(splat, radius);
+        splat.center.z + extent <= self.near
+            || splat.center.z - extent >= self.far
+            || self.clip_planes.iter().any(|plane| {
+                // The listing's exact test of a disc against a plane, the axes being sigma-scaled (Q = 1).
+                let [a, b] = splat.axes.map(|axis| plane.xyz().dot(axis));
+                let c = plane.xyz().dot(splat.center) + plane.w;
+                c < 0.0 && radius * radius * (a * a + b * b) < c * c
+            })
+    }
+
+    /// The depths of the visible part of a disc of `radius` sigma.
+    pub(super) fn depth_extent(&self, splat: &CameraSplat, radius: f64) -> Extent {
+        let extent = half_depth(splat, radius);
+        Extent { min: (splat.center.z - extent).max(self.near), max: splat.center.z + extent }
+    }
+
+    /// Radius of the largest circle of confusion over these depths, in tan units (L136-141; errata E6-E9).
+    pub fn circle_of_confusion(&self, depth: Extent) -> f64 {
+        self.lens.map_or(0.0, |lens| {
+            let blur = |w: f64| (1.0 / w - 1.0 / lens.focus).abs();
+            lens.radius * blur(depth.min).max(blur(depth.max))
+        })
+    }
+
+    /// The largest offsets, in pixels, of a sample in the window and in a box (in pixels) from a point.
+    pub(super) fn reach(&self, from: DVec2, screen: &[Extent; 2]) -> [f64; 2] {
+        let low = [self.window.x0, self.window.y0];
+        let high = [self.window.x1, self.window.y1];
+        [0, 1].map(|axis| {
+            let room = self.filter_radius + 1.0;
+            let min = screen[axis].min.max(f64::from(low[axis])) - room;
+            let max = screen[axis].max.min(f64::from(high[axis])) + room;
+            (min - from[axis]).abs().max((max - from[axis]).abs())
+        })
+    }
+
+    /// The pixels of the window of which a sample may fall into a box (in pixels). Pixel i's samples lie within the
+    /// filter's radius of i + 1/2.
+    pub(super) fn candidates(&self, screen: &[Extent; 2]) -> PixelRect {
+        let room = self.filter_radius + BOX_PADDING;
+        // Casts saturate, and the window is far smaller than their range.
+        let first = |extent: Extent| (extent.min - room - 0.5).ceil() as i32;
+        let end = |extent: Extent| ((extent.max + room - 0.5).floor() as i32).saturating_add(1);
+        let [x, y] = *screen;
+        PixelRect::new(first(x), first(y), end(x), end(y)).intersect(&self.window)
+    }
+}
