@@ -1,6 +1,6 @@
 //! From the fragments of a sample to its colour: SPEC section 6, notes 2.3.
 
-use crate::{Fragment, SplatSurface};
+use crate::{Fragment, MAX_RANK, SplatSurface};
 
 /// Layers lighter than this are dropped: a surface needs that much of its weight to be there at all.
 pub const MIN_LAYER_WEIGHT: f32 = 1e-3;
@@ -118,12 +118,20 @@ impl Layer {
     }
 }
 
+/// A key that sorts fragments by facing, then by the near end of their interval: facing in bit 63, the near end's
+/// bits, turned so that they sort as the numbers do, below it, and the fragment's number in the lowest 31.
+fn near_end_key(back: bool, near: f32, number: usize) -> u64 {
+    let bits = near.to_bits();
+    let sortable = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    u64::from(back) << 63 | u64::from(sortable) << 31 | number as u64
+}
+
 /// Resolves one sample after the other; keeps its scratch memory between them.
 #[derive(Debug)]
 pub struct Resolver {
     mode: Resolve,
     intervals: Vec<[f32; 2]>,
-    order: Vec<u32>,
+    order: Vec<u64>,
     layer_of: Vec<u32>,
     layers: Vec<Layer>,
     visible: Option<usize>,
@@ -187,21 +195,18 @@ impl Resolver {
         self.intervals.clear();
         self.intervals.extend(fragments.iter().map(|f| thickness.interval(f, &surfaces[f.rank() as usize])));
         self.order.clear();
-        self.order.extend(0..fragments.len() as u32);
-        let (intervals, order) = (&self.intervals, &mut self.order);
-        order.sort_unstable_by(|&i, &j| {
-            let facing = |i: u32| fragments[i as usize].is_back();
-            let near = |i: u32| intervals[i as usize][0];
-            facing(i).cmp(&facing(j)).then(near(i).total_cmp(&near(j)))
-        });
+        let keys = self.intervals.iter().zip(fragments).enumerate();
+        self.order.extend(keys.map(|(i, (&[near, _], fragment))| near_end_key(fragment.is_back(), near, i)));
+        self.order.sort_unstable();
 
         self.layers.clear();
         self.layer_of.clear();
         self.layer_of.resize(fragments.len(), 0);
         let mut far_end = f32::NEG_INFINITY;
-        for &i in &self.order {
-            let back = fragments[i as usize].is_back();
-            let [near, far] = self.intervals[i as usize];
+        for &key in &self.order {
+            let i = (key & u64::from(MAX_RANK)) as usize;
+            let back = fragments[i].is_back();
+            let [near, far] = self.intervals[i];
             let open = self.layers.last().is_some_and(|layer| layer.back == back && near <= far_end);
             if open {
                 far_end = far_end.max(far);
@@ -209,7 +214,7 @@ impl Resolver {
                 self.layers.push(Layer::new(self.layers.len() as u32, back));
                 far_end = far;
             }
-            self.layer_of[i as usize] = self.layers.len() as u32 - 1;
+            self.layer_of[i] = self.layers.len() as u32 - 1;
         }
     }
 

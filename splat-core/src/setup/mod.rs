@@ -312,25 +312,31 @@ fn compare(a: Vec3, b: Vec3) -> Ordering {
     pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
-/// The map from world space to a splat's own coordinates (u, v).
+/// The shape of a splat as a measure of distance from its centre.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InverseShape {
     u: DVec3,
     v: DVec3,
+    normal: DVec3,
 }
 
 impl InverseShape {
-    /// The map of a splat without a defect: the dual basis of its axes in its plane.
+    /// The shape of a splat without a defect: the dual basis of its axes in its plane, and across it a unit of the
+    /// same area's root.
     pub(crate) fn new(cloud: &Cloud, index: usize) -> Self {
         let normal = cloud.normals[index].as_dvec3().normalize();
         let [t1, t2] = world_axes(cloud, index, normal);
         let cross = t1.cross(t2);
-        let length_squared = cross.length_squared();
-        Self { u: t2.cross(cross) / length_squared, v: cross.cross(t1) / length_squared }
+        let squared = cross.length_squared();
+        Self {
+            u: t2.cross(cross) / squared,
+            v: cross.cross(t1) / squared,
+            normal: cross / (squared * cross.length()).sqrt(),
+        }
     }
 
-    /// u^2 + v^2 at an offset from the splat's centre; the component along the normal does not count.
+    /// The squared distance of an offset from the splat's centre, in sigma.
     pub(crate) fn r2(&self, offset: DVec3) -> f64 {
-        self.u.dot(offset).powi(2) + self.v.dot(offset).powi(2)
+        self.u.dot(offset).powi(2) + self.v.dot(offset).powi(2) + self.normal.dot(offset).powi(2)
     }
 }
