@@ -1,1 +1,11 @@
-//! Placeholder.
+//! The test oracle: what every renderer of this workspace is judged against.
+//!
+//! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
+//! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
+//! - [`random`]: deterministic random numbers for scenes;
+//! - [`tolerances`]: every tolerance with its derivation.
+
+pub mod brute_force;
+pub mod listing;
+pub mod random;
+pub mod tolerances;

@@ -1,0 +1,226 @@
+//! The sample evaluation of SPEC section 4 over lanes: line by line that of [`splat_core::evaluate`], which says what
+//! each quantity means. Where that returns early, this computes on and masks.
+
+use crate::Lanes;
+use splat_core::evaluate::{LensPoint, Limits, SplatConstants};
+
+/// A splat's constants, each in every lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneSplat<L> {
+    h: [L; 2],
+    a1: L,
+    b: [L; 2],
+    reference: [L; 2],
+    centred: bool,
+    depth: L,
+    inverse_depth: L,
+    depth_slope: [L; 2],
+    edge_on: L,
+}
+
+/// The limits of hits, each in every lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneLimits<L> {
+    cutoff: L,
+    near: L,
+    far: L,
+}
+
+/// A lens point a lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneLensPoint<L> {
+    /// As [`LensPoint::p`].
+    pub p: [L; 2],
+    /// As [`LensPoint::p_over_focus`].
+    pub p_over_focus: [L; 2],
+}
+
+/// Hits of several samples: lanes without a hit hold arbitrary values.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneHits<L> {
+    /// Bit i is set where lane i is hit.
+    pub mask: u32,
+    /// Bit i is set where lane i's lens point is on the other side of the splat's plane than the eye.
+    pub flipped: u32,
+    /// u^2 + v^2.
+    pub r2: L,
+    /// View depth w, in camera units.
+    pub depth: L,
+}
+
+impl<L: Lanes> LaneLimits<L> {
+    /// The limits in every lane.
+    pub fn new(limits: &Limits<f32>) -> Self {
+        Self { cutoff: L::splat(limits.cutoff), near: L::splat(limits.near), far: L::splat(limits.far) }
+    }
+}
+
+impl<L: Lanes> LaneLensPoint<L> {
+    /// The same point in every lane.
+    pub fn splat(point: &LensPoint<f32>) -> Self {
+        Self { p: point.p.map(L::splat), p_over_focus: point.p_over_focus.map(L::splat) }
+    }
+}
+
+impl<L: Lanes> LaneSplat<L> {
+    /// The constants in every lane.
+    pub fn new(constants: &SplatConstants<f32>) -> Self {
+        Self {
+            h: constants.h.map(L::splat),
+            a1: L::splat(constants.a1),
+            b: constants.b.map(L::splat),
+            reference: constants.reference.map(L::splat),
+            centred: constants.centred,
+            depth: L::splat(constants.depth),
+            inverse_depth: L::splat(constants.inverse_depth),
+            depth_slope: constants.depth_slope.map(L::splat),
+            edge_on: L::splat(constants.edge_on),
+        }
+    }
+
+    /// [`SplatConstants::pinhole`] for a sample a lane.
+    #[inline(always)]
+    pub fn pinhole(&self, d: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
+        let g = L::splat(1.0) + (self.h[0] * d[0] + self.h[1] * d[1]);
+        let inside = g.greater(L::splat(0.0));
+        let nu = self.a1 * d[1];
+        let nv = self.b[0] * d[0] + self.b[1] * d[1];
+        self.hits(inside, nu, nv, g, self.depth, 0, limits)
+    }
+
+    /// [`SplatConstants::thin_lens`] for a sample a lane.
+    #[inline(always)]
+    pub fn thin_lens(&self, d: [L; 2], lens: &LaneLensPoint<L>, limits: &LaneLimits<L>) -> LaneHits<L> {
+        let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
+        let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
+        let he = self.h[0] * e[0] + self.h[1] * e[1];
+        let hq = self.h[0] * q[0] + self.h[1] * q[1];
+        let g = L::splat(1.0) + he;
+        let side = L::splat(1.0) - hq;
+        let inside = (g * side).greater(self.edge_on);
+        let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
+        let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
+        let nu = self.a1 * m1;
+        let nv = self.b[0] * m0 + self.b[1] * m1;
+        let flipped = side.less(L::splat(0.0)).bits();
+        self.hits(inside, nu, nv, g, self.depth * side, flipped, limits)
+    }
+
+    /// [`SplatConstants::orthographic`] for a sample a lane.
+    #[inline(always)]
+    pub fn orthographic(&self, d: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
+        let u = self.reference[0] + self.a1 * d[1];
+        let v = self.reference[1] + (self.b[0] * d[0] + self.b[1] * d[1]);
+        let r2 = u * u + v * v;
+        let depth = self.depth + (self.depth_slope[0] * u + self.depth_slope[1] * v);
+        let inside = r2.less(limits.cutoff) & depth.greater(limits.near) & depth.less(limits.far);
+        LaneHits { mask: inside.bits(), flipped: 0, r2, depth }
+    }
+
+    /// The common end of the perspective forms.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the seven quantities of one formula, inlined twice")]
+    fn hits(
+        &self,
+        inside: L,
+        nu: L,
+        nv: L,
+        g: L,
+        scaled_depth: L,
+        flipped: u32,
+        limits: &LaneLimits<L>,
+    ) -> LaneHits<L> {
+        let inverse_g = L::splat(1.0) / g;
+        let u = self.reference[0] + nu * inverse_g;
+        let v = self.reference[1] + nv * inverse_g;
+        let r2 = u * u + v * v;
+        let depth = scaled_depth * inverse_g;
+        let on_splat = if self.centred {
+            (nu * nu + nv * nv).less(limits.cutoff * (g * g))
+        } else {
+            r2.less(limits.cutoff)
+        };
+        let inside = inside & on_splat & depth.greater(limits.near) & depth.less(limits.far);
+        LaneHits { mask: inside.bits(), flipped, r2, depth }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use splat_core::evaluate::Hit;
+    use wide::f32x8;
+
+    /// Numbers of every magnitude that set-up can make, both signs, and zero.
+    fn number() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            8 => -4.0f32..4.0,
+            4 => (-30.0f32..30.0, any::<bool>()).prop_map(|(e, s)| e.exp2() * if s { 1.0 } else { -1.0 }),
+            1 => Just(0.0f32),
+        ]
+    }
+
+    fn constants() -> impl Strategy<Value = SplatConstants<f32>> {
+        let pair = || [number(), number()];
+        (pair(), number(), pair(), prop_oneof![Just([0.0, 0.0]).boxed(), pair().boxed()], number(), pair())
+            .prop_map(|(h, a1, b, reference, depth, depth_slope)| SplatConstants {
+                xi: 0,
+                yi: 0,
+                xf: 0.0,
+                yf: 0.0,
+                h,
+                a1,
+                b,
+                reference,
+                centred: reference == [0.0, 0.0],
+                depth: depth.abs(),
+                inverse_depth: 1.0 / depth.abs().max(1e-9),
+                depth_slope,
+                edge_on: 1e-9,
+            })
+    }
+
+    /// Checks the lanes against the reference's hits, bit by bit.
+    fn check(lanes: &LaneHits<f32x8>, scalar: [Option<Hit<f32>>; 8]) -> Result<(), TestCaseError> {
+        let (r2, depth) = (lanes.r2.to_array(), lanes.depth.to_array());
+        for (lane, hit) in scalar.into_iter().enumerate() {
+            let bit = |mask: u32| mask >> lane & 1 == 1;
+            prop_assert_eq!(bit(lanes.mask), hit.is_some());
+            if let Some(hit) = hit {
+                prop_assert_eq!(r2[lane].to_bits(), hit.r2.to_bits());
+                prop_assert_eq!(depth[lane].to_bits(), hit.depth.to_bits());
+                prop_assert_eq!(bit(lanes.flipped), hit.flipped);
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn lanes_have_the_bits_of_the_reference(
+            splat in constants(),
+            x in proptest::array::uniform8(number()),
+            y in proptest::array::uniform8(number()),
+            lens in [number(), number(), number(), number()],
+        ) {
+            let limits = Limits { cutoff: 4.0, near: 1e-3, far: 1e6 };
+            let lane_limits = LaneLimits::new(&limits);
+            let lane_splat = LaneSplat::<f32x8>::new(&splat);
+            let d = [f32x8::from(x), f32x8::from(y)];
+            let each = |evaluate: &dyn Fn([f32; 2]) -> Option<Hit<f32>>| -> [Option<Hit<f32>>; 8] {
+                std::array::from_fn(|lane| evaluate([x[lane], y[lane]]))
+            };
+            check(&lane_splat.pinhole(d, &lane_limits), each(&|d| splat.pinhole(d, &limits)))?;
+            check(&lane_splat.orthographic(d, &lane_limits), each(&|d| splat.orthographic(d, &limits)))?;
+            let point = LensPoint { p: [lens[0], lens[1]], p_over_focus: [lens[2], lens[3]] };
+            let lane_point = LaneLensPoint::splat(&point);
+            check(
+                &lane_splat.thin_lens(d, &lane_point, &lane_limits),
+                each(&|d| splat.thin_lens(d, &point, &limits)),
+            )?;
+        }
+    }
+}
