@@ -1,1 +1,26 @@
-//! Placeholder.
+//! Clouds, cameras and pictures in and out of files.
+//!
+//! Every byte of input is taken as hostile: a size that a file claims is held against the size that the file
+//! has before anything is allocated, and whatever is wrong becomes an [`Error`] that says where it is, what
+//! was found and what was expected. An output file is absent, old, or complete ([`AtomicFile`]).
+
+pub mod atomic;
+pub mod camera_json;
+pub mod error;
+pub mod exr_file;
+pub mod import;
+pub mod metadata;
+pub mod picture;
+pub mod ply;
+pub mod png_file;
+pub mod srgb;
+
+pub use atomic::AtomicFile;
+pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
+pub use error::{Error, Place};
+pub use exr_file::{Compression, ExrOptions, write_exr};
+pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
+pub use metadata::Metadata;
+pub use picture::{PictureFormat, write_picture};
+pub use ply::{PlyEncoding, read_ply, read_ply_from, write_ply};
+pub use png_file::write_png;

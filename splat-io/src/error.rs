@@ -1,0 +1,154 @@
+//! What can be wrong with a file.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a file cannot be read or written.
+///
+/// Every message is whole: it names the file and holds the cause's own words. Hence no error has a `source`,
+/// which a program that prints chains would say twice.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refused: the blame lies outside the file's contents.
+    #[error("{}: cannot {action}: {cause}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried, as a verb: "open", "read", "write".
+        action: &'static str,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// The file may well be right, but this version cannot do it.
+    #[error("{}: {found} is not supported, expected {expected}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What the file holds or asks for.
+        found: String,
+        /// What would be accepted.
+        expected: String,
+    },
+    /// The file breaks the rules of its format.
+    #[error("{}: {place}: found {found}, expected {expected}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        place: Place,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: String,
+    },
+    /// The file asks for more than this version allows.
+    #[error("{}: {what} is beyond the limit of {limit}", path.display())]
+    Limit {
+        /// The file.
+        path: PathBuf,
+        /// What is too large, with its size.
+        what: String,
+        /// The greatest accepted size.
+        limit: String,
+    },
+    /// Not JSON, or not the JSON expected; the cause names line, column, what was found and what was
+    /// expected.
+    #[error("{}: {cause}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What the JSON parser said.
+        cause: serde_json::Error,
+    },
+    /// The contents, well formed, make no sense to the renderer; or what was to be written does not.
+    #[error("{}: {cause}", path.display())]
+    Core {
+        /// The file.
+        path: PathBuf,
+        /// What the renderer's own check said.
+        cause: splat_core::Error,
+    },
+    /// The encoder of a picture format failed: a mistake of the program, not of the user.
+    #[error("{}: cannot encode: {reason}", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder said.
+        reason: String,
+    },
+}
+
+/// Where in a file something is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line of a text, counted from 1.
+    Line(u64),
+    /// A byte, counted from 0.
+    Byte(u64),
+    /// A row of the binary table of an element.
+    Row {
+        /// The element's name.
+        element: String,
+        /// The row, counted from 0.
+        row: u64,
+        /// The byte of the file, counted from 0.
+        byte: u64,
+    },
+    /// A named field.
+    Field(&'static str),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => write!(f, "whole file"),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::Row { element, row, byte } => write!(f, "row {row} of element {element}, byte {byte}"),
+            Self::Field(field) => write!(f, "field {field}"),
+        }
+    }
+}
+
+impl Error {
+    /// An [`Error::Io`]; made for `map_err`.
+    pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |cause| Self::Io { path: path.to_owned(), action, cause }
+    }
+
+    /// An [`Error::Invalid`].
+    pub(crate) fn invalid(
+        path: &Path,
+        place: Place,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { path: path.to_owned(), place, found: found.into(), expected: expected.into() }
+    }
+
+    /// An [`Error::Unsupported`].
+    pub(crate) fn unsupported(path: &Path, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.to_owned(), found: found.into(), expected: expected.into() }
+    }
+
+    /// An [`Error::Limit`].
+    pub(crate) fn limit(path: &Path, what: impl Into<String>, limit: impl Into<String>) -> Self {
+        Self::Limit { path: path.to_owned(), what: what.into(), limit: limit.into() }
+    }
+
+    /// An [`Error::Core`]; made for `map_err`.
+    pub(crate) fn core(path: &Path) -> impl FnOnce(splat_core::Error) -> Self {
+        move |cause| Self::Core { path: path.to_owned(), cause }
+    }
+}
+
+/// Bytes of a file as they may appear in a message: in backquotes, on one line, shortened, nothing raw.
+pub(crate) fn quoted(bytes: &[u8]) -> String {
+    const MOST: usize = 40;
+    let shown = &bytes[..bytes.len().min(MOST)];
+    let more = if bytes.len() > MOST { ".." } else { "" };
+    format!("`{}{more}`", shown.escape_ascii())
+}

@@ -1,0 +1,197 @@
+use super::*;
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
+use glam::{DVec3, DVec4};
+use splat_core::{AovSelection, PixelRect};
+use std::fs;
+
+const ALL: AovSelection = AovSelection {
+    depth: true,
+    normal: true,
+    albedo: true,
+    position: true,
+    id: true,
+    coverage: true,
+    layers: true,
+    samples: true,
+    variance: true,
+};
+
+/// A film whose every value says where it belongs.
+fn film(window: PixelRect, aovs: AovSelection) -> Film {
+    let mut film = Film::new([64, 48], window, aovs);
+    let value = |plane: usize, index: usize| plane as f32 + index as f32 / 1024.0;
+    let fill = |column: &mut Option<Vec<f32>>, plane: usize| {
+        let values = column.iter_mut().flatten().enumerate();
+        values.for_each(|(index, slot)| *slot = value(plane, index));
+    };
+    let fill_vectors = |column: &mut Option<Vec<Vec3>>, plane: usize| {
+        let values = column.iter_mut().flatten().enumerate();
+        values.for_each(|(index, slot)| {
+            *slot = Vec3::new(value(plane, index), value(plane + 1, index), value(plane + 2, index));
+        });
+    };
+    for (index, pixel) in film.rgba.iter_mut().enumerate() {
+        *pixel = std::array::from_fn(|plane| value(plane, index));
+    }
+    fill(&mut film.depth, 4);
+    fill(&mut film.coverage, 5);
+    fill(&mut film.layers, 6);
+    fill(&mut film.samples, 7);
+    fill_vectors(&mut film.normal, 8);
+    fill_vectors(&mut film.albedo, 11);
+    fill_vectors(&mut film.position, 14);
+    fill_vectors(&mut film.variance, 17);
+    film.id.iter_mut().flatten().enumerate().for_each(|(index, id)| *id = index as u32 + 0xffff_0000);
+    film
+}
+
+fn write(film: &Film, metadata: &Metadata, options: &ExrOptions) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    write_exr(&path, film, metadata, options).unwrap();
+    fs::read(&path).unwrap()
+}
+
+type ReadBack = Image<Layer<exr::prelude::AnyChannels<FlatSamples>>>;
+
+fn read_back(bytes: &[u8]) -> ReadBack {
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+    reader.all_attributes().from_buffered(io::Cursor::new(bytes)).unwrap()
+}
+
+fn samples<'a>(image: &'a ReadBack, name: &str) -> &'a FlatSamples {
+    let mut channels = image.layer_data.channel_data.list.iter();
+    &channels.find(|channel| channel.name == *name).unwrap_or_else(|| panic!("{name}")).sample_data
+}
+
+#[test]
+fn every_channel_comes_back_under_every_compression() {
+    let film = film(PixelRect::new(5, -3, 38, 30), ALL);
+    let planes = [
+        ("R", 0),
+        ("G", 1),
+        ("B", 2),
+        ("A", 3),
+        ("Z", 4),
+        ("coverage", 5),
+        ("layers", 6),
+        ("samples", 7),
+        ("N.X", 8),
+        ("N.Y", 9),
+        ("N.Z", 10),
+        ("albedo.R", 11),
+        ("albedo.G", 12),
+        ("albedo.B", 13),
+        ("P.X", 14),
+        ("P.Y", 15),
+        ("P.Z", 16),
+        ("variance.R", 17),
+        ("variance.G", 18),
+        ("variance.B", 19),
+    ];
+    let compressions =
+        [Compression::None, Compression::Rle, Compression::Zip, Compression::Zips, Compression::Piz];
+    for compression in compressions {
+        for (full_floats, parallel) in [(false, false), (true, true)] {
+            let options = ExrOptions { full_floats, compression, parallel };
+            let image = read_back(&write(&film, &Metadata::default(), &options));
+            assert_eq!(image.layer_data.channel_data.list.len(), planes.len() + 1);
+            for (name, plane) in planes {
+                let samples = samples(&image, name);
+                let is_full = matches!(samples, FlatSamples::F32(_));
+                let always = ["Z", "P.X", "P.Y", "P.Z", "layers", "samples"].contains(&name);
+                assert_eq!(is_full, full_floats || always || name.starts_with("variance"), "{name}");
+                for (index, found) in samples.values_as_f32().enumerate() {
+                    let value = plane as f32 + index as f32 / 1024.0;
+                    let expected = if is_full { value } else { f16::from_f32(value).to_f32() };
+                    assert_eq!(found, expected, "{name}[{index}] {compression:?}");
+                }
+            }
+            let FlatSamples::U32(ids) = samples(&image, "id") else { panic!("id") };
+            assert_eq!(ids, film.id.as_ref().unwrap());
+        }
+    }
+}
+
+#[test]
+fn windows_are_data_and_display_window() {
+    let film = film(PixelRect::new(5, 7, 9, 10), AovSelection::default());
+    let image = read_back(&write(&film, &Metadata::default(), &ExrOptions::default()));
+    assert_eq!(image.attributes.display_window, IntegerBounds::from_dimensions(Vec2(64, 48)));
+    assert_eq!(image.layer_data.attributes.layer_position, Vec2(5, 7));
+    assert_eq!(image.layer_data.size, Vec2(4, 3));
+    assert_eq!(image.layer_data.channel_data.list.len(), 4);
+}
+
+#[test]
+fn halves_saturate() {
+    assert_eq!(saturated(1e6).to_f32(), 65504.0);
+    assert_eq!(saturated(65519.0).to_f32(), 65504.0);
+    assert_eq!(saturated(f32::NEG_INFINITY).to_f32(), -65504.0);
+    assert!(saturated(f32::NAN).is_nan());
+    assert_eq!(saturated(0.5).to_f32(), 0.5);
+}
+
+#[test]
+fn metadata_come_back() {
+    let mut matrix = DMat4::from_cols_array(&std::array::from_fn(|i| i as f64));
+    matrix.w_axis = DVec4::new(500_000.1, 2.0, 3.0, 1.0);
+    let metadata = Metadata {
+        software: Some("splat 0.1.0".to_owned()),
+        world_to_camera: Some(matrix),
+        samples: Some(64),
+        sample_range: Some(16..32),
+        seed: Some(u64::MAX),
+        engine: Some("reference".to_owned()),
+        options: Some("--exp lerp256 ü".to_owned()),
+        input_hash: Some("00ff".to_owned()),
+    };
+    let mut film = film(PixelRect::new(0, 0, 2, 2), ALL);
+    film.position_origin = DVec3::new(500_000.25, 0.0, -1.0);
+    let image = read_back(&write(&film, &metadata, &ExrOptions::default()));
+    let attributes = &image.layer_data.attributes;
+    assert_eq!(attributes.software_name, Some(text("splat 0.1.0")));
+    let expected = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 500_000.1_f64 as f32, 2., 3., 1.];
+    assert_eq!(attributes.world_to_camera, Some(expected));
+    let texts = [
+        ("worldToCameraText", "[[0, 4, 8, 500000.1], [1, 5, 9, 2], [2, 6, 10, 3], [3, 7, 11, 1]]"),
+        ("sampleRange", "16:32"),
+        ("seed", "18446744073709551615"),
+        ("engine", "reference"),
+        ("options", "--exp lerp256 ü"),
+        ("inputHash", "00ff"),
+        ("positionOrigin", "500000.25 0 -1"),
+    ];
+    for (name, value) in texts {
+        assert_eq!(attributes.other.get(&text(name)), Some(&AttributeValue::Text(text(value))), "{name}");
+    }
+    assert_eq!(attributes.other.get(&text("samples")), Some(&AttributeValue::I32(64)));
+    assert_eq!(attributes.other.len(), texts.len() + 1);
+}
+
+#[test]
+fn the_same_picture_is_the_same_file_with_sorted_attributes() {
+    let metadata =
+        Metadata { seed: Some(1), samples: Some(2), engine: Some("x".into()), ..Metadata::default() };
+    let film = film(PixelRect::new(0, 0, 64, 48), ALL);
+    let files: Vec<_> = [true, false, true]
+        .map(|parallel| write(&film, &metadata, &ExrOptions { parallel, ..ExrOptions::default() }))
+        .to_vec();
+    assert!(files.windows(2).all(|pair| pair[0] == pair[1]));
+    let place = |name: &[u8]| files[0].windows(name.len()).position(|window| window == name).unwrap();
+    assert!(place(b"channels\0") < place(b"compression\0"));
+    assert!(place(b"engine\0") < place(b"seed\0"));
+}
+
+#[test]
+fn an_empty_or_damaged_film_is_refused() {
+    let empty = film(PixelRect::new(3, 3, 3, 9), ALL);
+    let path = Path::new("never-written.exr");
+    let message =
+        write_exr(path, &empty, &Metadata::default(), &ExrOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("no pixel"), "{message}");
+    let mut short = film(PixelRect::new(0, 0, 3, 3), ALL);
+    short.depth.as_mut().unwrap().pop();
+    assert!(write_exr(path, &short, &Metadata::default(), &ExrOptions::default()).is_err());
+    assert!(!path.exists());
+}

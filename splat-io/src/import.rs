@@ -1,0 +1,91 @@
+//! A cloud that was read, and what was understood of its file.
+
+use splat_core::Cloud;
+use std::fmt;
+use std::path::PathBuf;
+
+/// A cloud from a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Import {
+    /// The cloud: as many splats as the file has rows, bad ones included.
+    pub cloud: Cloud,
+    /// What the file holds and how it was read.
+    pub report: ImportReport,
+}
+
+/// What a file holds, and every assumption made in reading it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImportReport {
+    /// The file.
+    pub path: PathBuf,
+    /// The format, as text: "PLY, binary little endian".
+    pub format: String,
+    /// Size of the file, in bytes.
+    pub bytes: u64,
+    /// SHA-256 of the whole file, in lower-case hexadecimal.
+    pub sha256: String,
+    /// The file's tables, in its order.
+    pub elements: Vec<ElementReport>,
+    /// What was assumed, a sentence each.
+    pub assumptions: Vec<String>,
+}
+
+/// One table of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ElementReport {
+    /// Its name.
+    pub name: String,
+    /// Number of rows that the file claims (and, for the table of points, has).
+    pub count: u64,
+    /// Whether it is the table of points.
+    pub is_points: bool,
+    /// Its columns, in the file's order.
+    pub properties: Vec<PropertyReport>,
+}
+
+/// One column of a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PropertyReport {
+    /// Its name.
+    pub name: String,
+    /// Its type: "float", "uchar", "list uchar int".
+    pub kind: String,
+    /// What it is used for.
+    pub usage: Usage,
+}
+
+/// What a column is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Usage {
+    /// A coordinate.
+    Position,
+    /// A component of the normal.
+    Normal,
+    /// A channel of the colour.
+    Color,
+    /// The opacity.
+    Opacity,
+    /// The size: sigma.
+    Size,
+    /// The surface area.
+    Area,
+    /// A component of a tangent axis.
+    Tangent,
+    /// Nothing, for this reason.
+    Unused(&'static str),
+}
+
+impl fmt::Display for Usage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Position => write!(f, "position"),
+            Self::Normal => write!(f, "normal"),
+            Self::Color => write!(f, "color"),
+            Self::Opacity => write!(f, "opacity"),
+            Self::Size => write!(f, "size"),
+            Self::Area => write!(f, "area"),
+            Self::Tangent => write!(f, "tangent axis"),
+            Self::Unused(reason) => write!(f, "not used ({reason})"),
+        }
+    }
+}

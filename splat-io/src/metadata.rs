@@ -1,0 +1,34 @@
+//! What a picture file says about how it was made.
+
+use glam::DMat4;
+use std::ops::Range;
+
+/// How a picture was made. Every field is optional; what is `None` is not written.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Metadata {
+    /// The program and its version.
+    pub software: Option<String>,
+    /// World to camera space, for column vectors, as [`splat_core::Camera::world_to_camera`].
+    pub world_to_camera: Option<DMat4>,
+    /// Samples a pixel.
+    pub samples: Option<u32>,
+    /// The samples that were rendered, if not all.
+    pub sample_range: Option<Range<u32>>,
+    /// Seed of the sample patterns.
+    pub seed: Option<u64>,
+    /// The renderer: "reference" or "fast".
+    pub engine: Option<String>,
+    /// The options, as text.
+    pub options: Option<String>,
+    /// SHA-256 of the input, in hexadecimal.
+    pub input_hash: Option<String>,
+}
+
+impl Metadata {
+    /// The matrix as text: its rows, as the camera JSON lists them, with all digits.
+    pub(crate) fn matrix_text(matrix: &DMat4) -> String {
+        let row = |row: usize| matrix.row(row).to_array().map(|value| value.to_string()).join(", ");
+        let rows: Vec<_> = (0..4).map(|index| format!("[{}]", row(index))).collect();
+        format!("[{}]", rows.join(", "))
+    }
+}

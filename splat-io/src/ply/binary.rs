@@ -1,0 +1,154 @@
+//! Tables in binary, either endian.
+
+use super::columns::Columns;
+use super::header::{Element, Header, Kind};
+use super::roles::{Row, SLOTS};
+use super::scalar::Scalar;
+use super::source::Source;
+use crate::{Error, Place};
+use std::io::Read;
+
+/// Reads the tables up to the one of points into its columns; what follows is left alone.
+pub(super) fn read<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    header: &Header,
+    points: usize,
+    columns: &mut Columns,
+) -> Result<(), Error> {
+    for element in &header.elements[..points] {
+        skip::<R, BIG>(source, element)?;
+    }
+    let element = &header.elements[points];
+    if element.is_fixed() {
+        read_fixed::<R, BIG>(source, element, columns)
+    } else {
+        read_varying::<R, BIG>(source, element, columns)
+    }
+}
+
+/// Reads rows that all have the same size: whole windows at a time.
+fn read_fixed<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    element: &Element,
+    columns: &mut Columns,
+) -> Result<(), Error> {
+    let row_bytes = element.least_bytes();
+    let mut fields: Vec<(usize, Scalar, usize)> = Vec::new();
+    let mut offset = 0;
+    for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+        if let Kind::Scalar(kind) = property.kind {
+            fields.extend(slot.map(|slot| (offset, kind, slot)));
+            offset += kind.bytes();
+        }
+    }
+    let count = columns.count();
+    let mut values: Row = [0.0; SLOTS];
+    let mut done = 0;
+    while done < count {
+        if !source.want(row_bytes)? {
+            return Err(cut_off(source, element, done as u64));
+        }
+        let window = source.window();
+        let rows = (window.len() / row_bytes).min(count - done);
+        for row in window[..rows * row_bytes].chunks_exact(row_bytes) {
+            for &(offset, kind, slot) in &fields {
+                values[slot] = kind.decode::<BIG>(&row[offset..]);
+            }
+            columns.push(&values);
+        }
+        source.consume(rows * row_bytes);
+        done += rows;
+    }
+    Ok(())
+}
+
+/// Reads rows with lists in them, which are skipped.
+fn read_varying<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    element: &Element,
+    columns: &mut Columns,
+) -> Result<(), Error> {
+    let mut values: Row = [0.0; SLOTS];
+    for row in 0..columns.count() {
+        for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+            match property.kind {
+                Kind::Scalar(kind) => {
+                    let value = scalar::<R, BIG>(source, kind, element, row as u64)?;
+                    if let Some(slot) = *slot {
+                        values[slot] = value;
+                    }
+                }
+                Kind::List { count, item } => skip_list::<R, BIG>(source, count, item, element, row as u64)?,
+            }
+        }
+        columns.push(&values);
+    }
+    Ok(())
+}
+
+/// Skips a table.
+fn skip<R: Read, const BIG: bool>(source: &mut Source<R>, element: &Element) -> Result<(), Error> {
+    if element.is_fixed() {
+        // Fits: the claims were checked against the file's size.
+        let bytes = element.count.saturating_mul(element.least_bytes() as u64);
+        return if source.skip(bytes)? { Ok(()) } else { Err(cut_off(source, element, element.count)) };
+    }
+    for row in 0..element.count {
+        for property in &element.properties {
+            match property.kind {
+                Kind::Scalar(kind) => _ = scalar::<R, BIG>(source, kind, element, row)?,
+                Kind::List { count, item } => skip_list::<R, BIG>(source, count, item, element, row)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+#[inline]
+fn scalar<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    kind: Scalar,
+    element: &Element,
+    row: u64,
+) -> Result<f64, Error> {
+    if !source.want(kind.bytes())? {
+        return Err(cut_off(source, element, row));
+    }
+    let value = kind.decode::<BIG>(source.window());
+    source.consume(kind.bytes());
+    Ok(value)
+}
+
+fn skip_list<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    count: Scalar,
+    item: Scalar,
+    element: &Element,
+    row: u64,
+) -> Result<(), Error> {
+    let byte = source.offset();
+    let length = scalar::<R, BIG>(source, count, element, row)?;
+    let most = source.left() / item.bytes() as u64;
+    if length < 0.0 || length > most as f64 {
+        let place = Place::Row { element: element.name.clone(), row, byte };
+        let found = format!("a list of {length} entries");
+        return Err(Error::invalid(
+            source.path(),
+            place,
+            found,
+            format!("0 to {most}, what the file has left"),
+        ));
+    }
+    if source.skip(length as u64 * item.bytes() as u64)? {
+        Ok(())
+    } else {
+        Err(cut_off(source, element, row))
+    }
+}
+
+/// The file ends in a row.
+fn cut_off<R: Read>(source: &Source<R>, element: &Element, row: u64) -> Error {
+    let byte = source.offset() + source.window().len() as u64;
+    let place = Place::Row { element: element.name.clone(), row, byte };
+    Error::invalid(source.path(), place, "the end of the file", format!("{} rows", element.count))
+}

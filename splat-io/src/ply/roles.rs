@@ -1,0 +1,152 @@
+//! What each property of a table of points means.
+
+use super::header::{Element, Kind};
+use super::scalar::Scalar;
+use crate::{Error, Place, Usage};
+use std::ops::Range;
+use std::path::Path;
+
+/// Number of values of a row that can be of use.
+pub(super) const SLOTS: usize = 18;
+
+/// The values of a row: a slot each, by meaning.
+pub(super) type Row = [f64; SLOTS];
+
+pub(super) const POSITION: Range<usize> = 0..3;
+pub(super) const NORMAL: Range<usize> = 3..6;
+pub(super) const COLOR: Range<usize> = 6..9;
+pub(super) const OPACITY: usize = 9;
+pub(super) const SIZE: usize = 10;
+pub(super) const AREA: usize = 11;
+pub(super) const TANGENTS: Range<usize> = 12..18;
+
+/// The names of each slot; the first name that is present counts.
+const NAMES: [&[&str]; SLOTS] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx", "normal_x", "normalx"],
+    &["ny", "normal_y", "normaly"],
+    &["nz", "normal_z", "normalz"],
+    &["red", "r", "diffuse_red"],
+    &["green", "g", "diffuse_green"],
+    &["blue", "b", "diffuse_blue"],
+    &["opacity", "alpha", "a", "diffuse_alpha"],
+    &["radius", "psz", "size", "pscale", "scale"],
+    &["area"],
+    &["tu_x"],
+    &["tu_y"],
+    &["tu_z"],
+    &["tv_x"],
+    &["tv_y"],
+    &["tv_z"],
+];
+
+/// Slots that are of use only together.
+const GROUPS: [(Range<usize>, Usage); 7] = [
+    (POSITION, Usage::Position),
+    (NORMAL, Usage::Normal),
+    (COLOR, Usage::Color),
+    (OPACITY..OPACITY + 1, Usage::Opacity),
+    (SIZE..SIZE + 1, Usage::Size),
+    (AREA..AREA + 1, Usage::Area),
+    (TANGENTS, Usage::Tangent),
+];
+
+/// The meaning of each property.
+pub(super) struct Roles {
+    /// Per property, where its values go.
+    pub slots: Vec<Option<usize>>,
+    /// Per slot, the type of its property, where there is one.
+    pub kinds: [Option<Scalar>; SLOTS],
+    /// Per property, what is said of it.
+    pub usages: Vec<Usage>,
+    /// The name of the property that gives the size.
+    pub size_name: Option<String>,
+}
+
+impl Roles {
+    /// Decides what each property of the table of points is used for.
+    ///
+    /// Refuses trained splats, and a table without the three coordinates.
+    pub fn assign(element: &Element, path: &Path) -> Result<Self, Error> {
+        refuse_trained_splats(element, path)?;
+        let properties = &element.properties;
+        let scalar = |index: usize| match properties[index].kind {
+            Kind::Scalar(kind) => Some(kind),
+            Kind::List { .. } => None,
+        };
+        let mut usages: Vec<_> = properties
+            .iter()
+            .map(|property| Usage::Unused(why_unused(&property.name, property.kind)))
+            .collect();
+        let mut slots = vec![None; properties.len()];
+        let mut kinds = [None; SLOTS];
+        let mut size_name = None;
+        let chosen: [Option<usize>; SLOTS] = std::array::from_fn(|slot| {
+            NAMES[slot].iter().find_map(|name| {
+                let known = |index: &usize| properties[*index].name.eq_ignore_ascii_case(name);
+                (0..properties.len()).find(|index| known(index) && scalar(*index).is_some())
+            })
+        });
+        let is_elliptical = chosen[TANGENTS].iter().all(Option::is_some);
+        for (group, usage) in GROUPS {
+            let present = chosen[group.clone()].iter().all(Option::is_some);
+            for slot in group {
+                let Some(index) = chosen[slot] else { continue };
+                if !present {
+                    usages[index] = Usage::Unused("the other components are missing");
+                } else if slot == SIZE && is_elliptical {
+                    usages[index] = Usage::Unused("the tangent axes give the size");
+                } else {
+                    usages[index] = usage;
+                    slots[index] = Some(slot);
+                    kinds[slot] = scalar(index);
+                    if slot == SIZE {
+                        size_name = Some(properties[index].name.clone());
+                    }
+                }
+            }
+        }
+        if kinds[POSITION].contains(&None) {
+            let names: Vec<_> = element.properties.iter().take(16).map(|p| p.name.as_str()).collect();
+            let found = match names[..] {
+                [] => "no property".to_owned(),
+                _ => format!("the properties {}", names.join(", ")),
+            };
+            let expected = format!("the numbers x, y and z in element {}", element.name);
+            return Err(Error::invalid(path, Place::Line(element.line), found, expected));
+        }
+        Ok(Self { slots, kinds, usages, size_name })
+    }
+}
+
+/// Trained Gaussian splats look like points, but their numbers mean something else.
+fn refuse_trained_splats(element: &Element, path: &Path) -> Result<(), Error> {
+    let has = |name: &str| element.properties.iter().any(|property| property.name == name);
+    const EXPECTED: &str = "a PLY of surfels: x y z and, where known, normal, radius and color \
+                            (a later version reads trained splats)";
+    if has("packed_position") {
+        let found = "a compressed PLY of trained Gaussian splats (property packed_position)";
+        return Err(Error::unsupported(path, found, EXPECTED));
+    }
+    if ["rot_0", "rot_1", "rot_2", "rot_3", "scale_0", "f_dc_0"].into_iter().all(has) {
+        let found = "a PLY of trained Gaussian splats (properties rot_0 to rot_3, scale_0 and f_dc_0)";
+        return Err(Error::unsupported(path, found, EXPECTED));
+    }
+    Ok(())
+}
+
+/// Why a property that found no use has none.
+fn why_unused(name: &str, kind: Kind) -> &'static str {
+    let is = |known: &str| name.eq_ignore_ascii_case(known);
+    if matches!(kind, Kind::List { .. }) {
+        "a list"
+    } else if ["confidence", "quality", "intensity"].into_iter().any(is) {
+        "a measurement, not part of the picture"
+    } else if NAMES.iter().copied().flatten().copied().any(is) {
+        "another property of this meaning comes first"
+    } else {
+        "unknown"
+    }
+}
