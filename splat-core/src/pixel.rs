@@ -186,21 +186,20 @@ impl<'a> PixelResolver<'a> {
     /// The pixel over its background: premultiplied, linear colour and alpha.
     fn pixel_color(&self, color: [f64; 3], transmittance: f64) -> [f32; 4] {
         let mut rgba = [color[0], color[1], color[2], 1.0 - transmittance];
-        if let Some([red, green, blue, alpha]) = self.background {
-            let weight = transmittance * f64::from(alpha);
+        if let Some([red, green, blue, alpha]) = self.background.map(|values| values.map(f64::from)) {
+            let weight = transmittance * alpha;
             for (value, behind) in rgba.iter_mut().zip([red, green, blue]) {
-                let behind = if self.display_space { srgb::encode(behind) } else { behind };
-                *value += weight * f64::from(behind);
+                *value += weight * if self.display_space { srgb::encode(behind) } else { behind };
             }
             rgba[3] += weight;
         }
-        let [red, green, blue, alpha] = rgba.map(|value| value as f32);
+        let [red, green, blue, alpha] = rgba;
         if self.display_space && alpha > 0.0 {
             // Blended as trained, in the display's space; linear from here on.
             let [red, green, blue] = [red, green, blue].map(|value| srgb::decode(value / alpha) * alpha);
-            return [red, green, blue, alpha];
+            rgba = [red, green, blue, alpha];
         }
-        [red, green, blue, alpha]
+        rgba.map(|value| value as f32)
     }
 }
 

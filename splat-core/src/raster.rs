@@ -76,23 +76,20 @@ impl Rasterizer {
         sink: &mut impl FnMut(SamplePlace, Fragment),
     ) -> u64 {
         let constants = &splat.constants;
+        let limits = &self.limits;
         match self.form {
-            Form::Pinhole => {
-                self.visit(splat, rank, region, sink, |d, _| constants.pinhole(d, &self.limits));
-            }
-            Form::ThinLens => {
-                self.visit(splat, rank, region, sink, |d, lens| {
-                    constants.thin_lens(d, &lens[0], &self.limits)
-                });
-            }
+            Form::Pinhole => self.visit(splat, rank, region, sink, |d, _, _| constants.pinhole(d, limits)),
+            Form::ThinLens => self.visit(splat, rank, region, sink, |d, lens, sample| {
+                constants.thin_lens(d, &lens[sample], limits)
+            }),
             Form::Orthographic => {
-                self.visit(splat, rank, region, sink, |d, _| constants.orthographic(d, &self.limits));
+                self.visit(splat, rank, region, sink, |d, _, _| constants.orthographic(d, limits));
             }
         }
         region.area() as u64 * self.range.len() as u64
     }
 
-    /// The loop itself; `evaluate` gets the sample's offset and the lens points from its own one on.
+    /// The loop itself; `evaluate` gets the sample's offset, the pixel's lens points and the sample's index.
     #[inline(always)]
     fn visit(
         &self,
@@ -100,7 +97,7 @@ impl Rasterizer {
         rank: u32,
         region: &PixelRect,
         sink: &mut impl FnMut(SamplePlace, Fragment),
-        evaluate: impl Fn([f32; 2], &[LensPoint<f32>]) -> Option<Hit<f32>>,
+        evaluate: impl Fn([f32; 2], &[LensPoint<f32>], usize) -> Option<Hit<f32>>,
     ) {
         for y in region.y0..region.y1 {
             for x in region.x0..region.x1 {
@@ -108,7 +105,7 @@ impl Rasterizer {
                 let lens = self.samples.lens(x, y);
                 for sample in self.range.clone() {
                     let offset = splat.constants.offset(x, y, jitter[sample]);
-                    let Some(hit) = evaluate(offset, lens.get(sample..).unwrap_or(&[])) else { continue };
+                    let Some(hit) = evaluate(offset, lens, sample) else { continue };
                     let back = splat.back != (hit.flipped && splat.flips);
                     let weight = splat.weight_scale * self.table.weight(hit.r2);
                     let fragment = Fragment::new(hit.depth, weight, rank, back);

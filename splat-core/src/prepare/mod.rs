@@ -34,9 +34,12 @@ pub struct Estimated {
     pub areas: bool,
 }
 
-/// Completes a cloud, so that it can be rendered. What the cloud has is kept.
+/// Completes a cloud, so that it can be rendered. What the cloud has is kept; the axes of ellipses tell their normals.
 pub fn prepare(cloud: &mut Cloud, options: &PrepareOptions) -> Estimated {
     let mut estimated = Estimated::default();
+    if let (Shapes::Ellipses(axes), true) = (&cloud.shapes, cloud.normals.is_empty()) {
+        cloud.normals = axes.iter().map(|[t1, t2]| t1.cross(*t2).normalize_or_zero()).collect();
+    }
     let without_normals = cloud.normals.is_empty() && !cloud.is_empty();
     let unknown_sizes = match &cloud.shapes {
         Shapes::Discs(sizes) => sizes.iter().filter(|&&size| size == 0.0).count(),

@@ -10,6 +10,7 @@ mod view;
 
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
+pub use projection::project;
 pub use view::View;
 
 use crate::evaluate::SplatConstants;
@@ -112,7 +113,7 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
     if (options.cull && faces_away(&splat, view)) || view.is_clipped(&splat, radius) {
         return Outcome::Culled;
     }
-    let Some(exact) = projection::project(&splat, view) else { return Outcome::EdgeOn };
+    let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
     let depth = view.depth_extent(&splat, radius);
     let Some(usual) = screen_box(&splat, radius * (1.0 + margin::USUAL), view) else {
         return Outcome::Culled;
@@ -252,9 +253,9 @@ fn surface(
         }
     };
     let color = base_color(cloud, index, options.shading).map(|value| {
-        let value = (value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE);
+        let value = f64::from((value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE));
         // Trained splats blend in their display space.
-        if options.resolve == Resolve::Over { srgb::encode(value) } else { value }
+        (if options.resolve == Resolve::Over { srgb::encode(value) } else { value }) as f32
     });
     let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
     SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }

@@ -34,7 +34,7 @@ impl Tone {
             Self::Linear => value as f32,
             Self::Srgb8 => srgb::linear_from_srgb8()[usize::from(value as u8)],
             Self::Srgb8Signed => srgb::linear_from_srgb8()[usize::from(value as i8 as u8)],
-            Self::Srgb16 => srgb::linear_from_srgb(value / 65535.0) as f32,
+            Self::Srgb16 => splat_core::srgb::decode(value / 65535.0) as f32,
         }
     }
 }
@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn integer_colors_of_every_type_mean_the_same() {
-        let expected = srgb::linear_from_srgb(200.0 / 255.0) as f32;
+        let expected = splat_core::srgb::decode(200.0 / 255.0) as f32;
         for kind in [Scalar::U8, Scalar::I16, Scalar::I32, Scalar::U32] {
             assert_eq!(Tone::of(kind).linear(200.0), expected, "{kind:?}");
         }

@@ -1,7 +1,7 @@
 //! What the properties mean.
 
 use super::*;
-use crate::srgb::linear_from_srgb;
+use splat_core::srgb::decode;
 use glam::{DVec3, Vec3};
 use splat_core::{Defect, Shapes};
 
@@ -51,7 +51,7 @@ fn normals_that_are_all_zero_or_incomplete_are_absent() {
 
 #[test]
 fn colors_are_linearised_by_type() {
-    let linear = linear_from_srgb(51.0 / 255.0) as f32;
+    let linear = decode(51.0 / 255.0) as f32;
     for (kind, value, expected) in [
         ("uchar", 51.0, linear),
         ("ushort", 13107.0, linear),
