@@ -147,7 +147,7 @@ impl Support {
             let splat = camera_splat(cloud, index, &view);
             let reach = |direction: DVec3| {
                 let [a, b] = splat.axes.map(|axis| direction.dot(axis));
-                direction.dot(splat.center) + radius * a.hypot(b)
+                direction.dot(splat.center) + radius * DVec2::new(a, b).length()
             };
             for axis in 0..2 {
                 let sideways = DVec3::AXES[axis];

@@ -156,7 +156,10 @@ mod tests {
     fn number() -> impl Strategy<Value = f32> {
         prop_oneof![
             8 => -4.0f32..4.0,
-            4 => (-30.0f32..30.0, any::<bool>()).prop_map(|(e, s)| e.exp2() * if s { 1.0 } else { -1.0 }),
+            // Any bits with an exponent of -30 to 30.
+            4 => (97u32..157, 0u32..1 << 23, any::<bool>()).prop_map(|(exponent, digits, negative)| {
+                f32::from_bits(u32::from(negative) << 31 | exponent << 23 | digits)
+            }),
             1 => Just(0.0f32),
         ]
     }

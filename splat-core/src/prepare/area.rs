@@ -57,7 +57,7 @@ fn reach(cloud: &Cloud, index: usize) -> f64 {
         // An upper bound for axes that are not perpendicular.
         Shapes::Ellipses(axes) => {
             let [t1, t2] = axes[index].map(|axis| axis.as_dvec3());
-            t1.length().hypot(t2.length())
+            (t1.length_squared() + t2.length_squared()).sqrt()
         }
     }
 }

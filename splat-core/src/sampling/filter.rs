@@ -29,8 +29,8 @@ impl PixelFilter {
     pub fn cumulative(self, position: f64) -> f64 {
         match self {
             Self::Box => position + 0.5,
-            Self::Tent if position < 0.0 => 0.5 * (1.0 + position).powi(2),
-            Self::Tent => 1.0 - 0.5 * (1.0 - position).powi(2),
+            Self::Tent if position < 0.0 => 0.5 * (1.0 + position) * (1.0 + position),
+            Self::Tent => 1.0 - 0.5 * (1.0 - position) * (1.0 - position),
             Self::Gaussian => {
                 let below = |x: f64| 0.5 * (1.0 + libm::erf(x / (GAUSSIAN_SIGMA * std::f64::consts::SQRT_2)));
                 let tail = below(-self.radius());

@@ -33,7 +33,7 @@ fn wrapped_distance(a: [f64; 2], b: [f64; 2]) -> f64 {
         let d = (a[axis] - b[axis]).abs();
         d.min(1.0 - d)
     });
-    x.hypot(y)
+    (x * x + y * y).sqrt()
 }
 
 #[cfg(test)]

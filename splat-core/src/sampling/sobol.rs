@@ -79,7 +79,10 @@ mod tests {
         let n = 4096;
         for index in [0, 1, 5] {
             let mean = (0..n)
-                .map(|seed| f64::from(owen_scramble(first_dimension(index), hash(seed, 1))) / 2f64.powi(32))
+                .map(|seed| {
+                    f64::from(owen_scramble(first_dimension(index), hash(seed, 1)))
+                        / (u64::from(u32::MAX) + 1) as f64
+                })
                 .sum::<f64>()
                 / f64::from(n);
             assert!((mean - 0.5).abs() < 5.0 / (12.0 * f64::from(n)).sqrt(), "{index}: {mean}");

@@ -1,6 +1,7 @@
 //! The exact extents of a disc clipped at the near plane: notes 1.3, which replaces L106-134.
 
 use super::CameraSplat;
+use glam::DVec2;
 
 /// The least and greatest value of something over a splat.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,7 +14,7 @@ pub struct Extent {
 
 /// Half of the depth extent of a disc of the given radius: radius |t|, t = (T1.w, T2.w) (erratum E1).
 pub fn half_depth(splat: &CameraSplat, radius: f64) -> f64 {
-    radius * splat.axes[0].z.hypot(splat.axes[1].z)
+    radius * DVec2::new(splat.axes[0].z, splat.axes[1].z).length()
 }
 
 /// The extent of x/w (axis 0) or y/w (axis 1) over the disc of `radius` (in sigma), as far as it lies at w >= near.
@@ -65,15 +66,14 @@ pub fn perspective_extent(splat: &CameraSplat, radius: f64, near: f64, axis: usi
 /// The deepest point of the disc, in sigma, where its centre is nearer to the eye than a quarter of its half
 /// depth; there the centre is no good reference point. SPEC section 3.
 pub fn deep_reference(splat: &CameraSplat, radius: f64, half_depth: f64) -> Option<[f64; 2]> {
-    let slope = [splat.axes[0].z, splat.axes[1].z];
-    let scale = radius / slope[0].hypot(slope[1]);
-    (splat.center.z < 0.25 * half_depth).then_some([scale * slope[0], scale * slope[1]])
+    let slope = DVec2::new(splat.axes[0].z, splat.axes[1].z);
+    (splat.center.z < 0.25 * half_depth).then(|| (radius / slope.length() * slope).to_array())
 }
 
 /// The extent of x (axis 0) or y (axis 1) over the disc of `radius`, in camera units. (The near plane is left out:
 /// it never makes an orthographic extent unbounded.)
 pub fn orthographic_extent(splat: &CameraSplat, radius: f64, axis: usize) -> Extent {
-    let half = radius * splat.axes[0][axis].hypot(splat.axes[1][axis]);
+    let half = radius * DVec2::new(splat.axes[0][axis], splat.axes[1][axis]).length();
     Extent { min: splat.center[axis] - half, max: splat.center[axis] + half }
 }
 

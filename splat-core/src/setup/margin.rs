@@ -49,8 +49,9 @@ pub fn margin(
         let m_error = [0, 1].map(|i| 8.0 * EPSILON * (e[i] + q[i] + 1.0) * (1.0 + he + hq));
         let position_error = a1 * m_error[1] + b[0] * m_error[0] + b[1] * m_error[1];
         // A hit has g = (1 - h.q) wr/w, so g (1 - h.q) = (1 - h.q)^2 wr/w = g^2 w/wr.
-        let by_side = (LENS_CERTAINTY * side_error).powi(2) * g_min;
-        let by_position = (LENS_CERTAINTY * position_error).powi(2) * depth.min / constants.depth;
+        let [side_limit, position_limit] = [side_error, position_error].map(|error| LENS_CERTAINTY * error);
+        let by_side = side_limit * side_limit * g_min;
+        let by_position = position_limit * position_limit * depth.min / constants.depth;
         let certain = hq < 0.5 && position_error < 0.5 * g_min * cutoff_radius * USUAL;
         return Some(Margin {
             radius: if certain { usual } else { cutoff_radius + MAX_ERROR },
@@ -82,7 +83,7 @@ fn rim_error(splat: &CameraSplat, constants: &SplatConstants<f64>, view: &View) 
         if view.orthographic {
             let offset = view.project(point) - constants.pixel();
             let bound = constants.orthographic_error(offset.to_array(), view.max_jitter(), view.cutoff);
-            largest = largest.max(bound.u.hypot(bound.v));
+            largest = largest.max(bound.u + bound.v);
             continue;
         }
         if point.z < view.near {
@@ -95,7 +96,7 @@ fn rim_error(splat: &CameraSplat, constants: &SplatConstants<f64>, view: &View) 
         }
         let offset = view.project(point) - constants.pixel();
         let bound = constants.pinhole_error(offset.to_array(), view.max_jitter());
-        largest = largest.max(bound.u.hypot(bound.v));
+        largest = largest.max(bound.u + bound.v);
     }
     largest
 }

@@ -16,7 +16,7 @@ pub use view::View;
 use crate::evaluate::SplatConstants;
 use crate::options::Shading;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 use margin::margin;
 use splat_abuffer::{MAX_RANK, Resolve, SplatSurface, Thickness};
 use std::cmp::Ordering;
@@ -190,8 +190,7 @@ fn faces_away(splat: &CameraSplat, view: &View) -> bool {
         return false;
     }
     let lens_radius = view.lens.map_or(0.0, |lens| lens.radius);
-    -splat.normal.dot(splat.center) + lens_radius * splat.normal.x.hypot(splat.normal.y) < 0.0
-        || view.orthographic
+    -splat.normal.dot(splat.center) + lens_radius * splat.normal.xy().length() < 0.0 || view.orthographic
 }
 
 /// The exact box of a disc of `radius` sigma on the picture, blur and pixel filter left out: `[x, y]` in pixels,
@@ -229,7 +228,7 @@ fn weight_scale(cloud: &Cloud, index: usize, options: &RenderOptions) -> f32 {
 /// |T1 x T2| of a splat, in squared scene units.
 pub(crate) fn splat_area(cloud: &Cloud, index: usize) -> f64 {
     match &cloud.shapes {
-        Shapes::Discs(sizes) => f64::from(sizes[index]).powi(2),
+        Shapes::Discs(sizes) => f64::from(sizes[index]) * f64::from(sizes[index]),
         Shapes::Ellipses(axes) => {
             let [t1, t2] = axes[index].map(|axis| axis.as_dvec3());
             t1.cross(t2).length()
@@ -338,6 +337,6 @@ impl InverseShape {
 
     /// The squared distance of an offset from the splat's centre, in sigma.
     pub(crate) fn r2(&self, offset: DVec3) -> f64 {
-        self.u.dot(offset).powi(2) + self.v.dot(offset).powi(2) + self.normal.dot(offset).powi(2)
+        DVec3::new(self.u.dot(offset), self.v.dot(offset), self.normal.dot(offset)).length_squared()
     }
 }

@@ -38,7 +38,7 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
 
     // Rotate the basis by the (c, s) that makes the new second row horizontal: J' = [[p, q], [m, 0]]. Then
     // u = dy / q depends on dy alone, and v = (dx - u p) / m. r2 does not change.
-    let q = rows[0].y.hypot(rows[1].y);
+    let q = DVec2::new(rows[0].y, rows[1].y).length();
     let [c, s] = [rows[0].y / q, rows[1].y / q];
     let rotate = |first: f64, second: f64| [c * first + s * second, c * second - s * first];
     let p = rotate(rows[0].x, rows[1].x)[0];
