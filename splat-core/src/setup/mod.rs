@@ -30,10 +30,10 @@ const BOX_PADDING: f64 = 1.0 / 64.0;
 
 /// Linear colour of splats without one: white as a plain colour, light grey under the headlight.
 const UNCOLORED: [f32; 3] = [1.0; 3];
-const UNCOLORED_LIT: [f32; 3] = [0.7; 3];
+const UNCOLORED_LIT: [f32; 3] = [0.6; 3];
 
 /// Light that reaches a surface seen edge-on, relative to one that faces the headlight.
-const HEADLIGHT_AMBIENT: f64 = 0.12;
+const HEADLIGHT_AMBIENT: f64 = 0.04;
 
 /// A splat in camera space, in `f64`.
 #[derive(Debug, Clone, Copy, PartialEq)]
