@@ -35,7 +35,11 @@ mod tests {
     fn levels_are_the_rounded_transfer_function() {
         for i in 0..=100_000 {
             let x = f64::from(i) / 100_000.0;
-            assert_eq!(srgb8_from_linear(x), (splat_core::srgb::encode(x) * 255.0 + 0.5).floor() as u8, "{x}");
+            assert_eq!(
+                srgb8_from_linear(x),
+                (splat_core::srgb::encode(x) * 255.0 + 0.5).floor() as u8,
+                "{x}"
+            );
         }
     }
 

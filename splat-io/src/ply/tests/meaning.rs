@@ -1,8 +1,8 @@
 //! What the properties mean.
 
 use super::*;
-use splat_core::srgb::decode;
 use glam::{DVec3, Vec3};
+use splat_core::srgb::decode;
 use splat_core::{Defect, Shapes};
 
 /// A file of one vertex for each format: the same values after "float x/y/z" = 1 2 3.

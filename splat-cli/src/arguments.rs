@@ -1,0 +1,317 @@
+//! The command line as it is written: raw options, before anything is known of the cloud.
+
+use crate::choices::{
+    CompressionChoice, CoverageChoice, EngineChoice, ExrTypeChoice, FilterChoice, KernelChoice,
+    PatternChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice, UpChoice,
+};
+use crate::console::Console;
+use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
+use clap::{Args, Parser, Subcommand};
+use splat_core::{AovSelection, PixelRect};
+use std::ops::Range;
+use std::path::PathBuf;
+
+/// Pictures of surfel clouds.
+#[derive(Debug, Parser)]
+#[command(name = "splat", version, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render clouds to a picture
+    Render(Box<RenderArguments>),
+    /// Say what is in a file, and every assumption made in reading it
+    Info(InfoArguments),
+    /// Render a scene made in code, which shows what the program does
+    Demo(DemoArguments),
+}
+
+/// `splat info`.
+#[derive(Debug, Args)]
+pub struct InfoArguments {
+    /// A cloud (.ply) or a camera (.json)
+    pub file: PathBuf,
+    /// Write JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `splat demo`.
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// The picture: .exr or .png
+    #[arg(short, long, value_name = "FILE", required_unless_present = "save_ply")]
+    pub output: Option<PathBuf>,
+    /// Write the cloud as a PLY file, for `splat render`
+    #[arg(long, value_name = "FILE")]
+    pub save_ply: Option<PathBuf>,
+    /// Write the camera as a JSON file, for `splat render --camera`
+    #[arg(long, value_name = "FILE")]
+    pub save_camera: Option<PathBuf>,
+    /// Width and height of the picture, in pixels
+    #[arg(long, value_name = "WxH", value_parser = values::size, default_value = "1280x720")]
+    pub size: [u32; 2],
+    /// Samples a pixel
+    #[arg(long, value_name = "S", default_value_t = 16)]
+    pub spp: u32,
+    /// How talkative the program is.
+    #[command(flatten)]
+    pub talk: TalkArguments,
+}
+
+/// `splat render`.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// Clouds (.ply); several are rendered as one
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+    /// The picture: .exr (linear, all AOVs) or .png
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// From where.
+    #[command(flatten, next_help_heading = "Camera")]
+    pub camera: CameraArguments,
+    /// What part of the picture, and how it is sampled.
+    #[command(flatten, next_help_heading = "Samples")]
+    pub samples: SampleArguments,
+    /// What the splats look like.
+    #[command(flatten, next_help_heading = "Splats")]
+    pub splats: SplatArguments,
+    /// What is written.
+    #[command(flatten, next_help_heading = "Output")]
+    pub outputs: OutputArguments,
+    /// How talkative the program is.
+    #[command(flatten, next_help_heading = "Program")]
+    pub talk: TalkArguments,
+}
+
+/// The camera: from a file, or fitted to the cloud.
+#[derive(Debug, Clone, Default, Args)]
+pub struct CameraArguments {
+    /// A camera (.json) instead of one that is fitted to the cloud
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["view", "up", "ortho", "size"])]
+    pub camera: Option<PathBuf>,
+    /// front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees [default: 30,20]
+    #[arg(long, value_name = "VIEW", value_parser = values::view, allow_hyphen_values = true)]
+    pub view: Option<ViewDirection>,
+    /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    pub up: Option<UpChoice>,
+    /// An orthographic camera
+    #[arg(long, conflicts_with_all = ["fstop", "lens_radius", "focus", "blades"])]
+    pub ortho: bool,
+    /// Width and height of the picture, in pixels [default: 1280x960]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub size: Option<[u32; 2]>,
+    /// f-number of a thin lens whose image plane is at distance 1, in camera units
+    #[arg(long, value_name = "N", value_parser = values::positive, conflicts_with = "lens_radius")]
+    pub fstop: Option<f64>,
+    /// Radius of a thin lens, in camera units (scene units where the camera is fitted)
+    #[arg(long, value_name = "R", value_parser = values::positive)]
+    pub lens_radius: Option<f64>,
+    /// Depth in focus, in camera units, or inf [default: that of the cloud's centre]
+    #[arg(long, value_name = "DEPTH", value_parser = values::focus)]
+    pub focus: Option<f64>,
+    /// Straight blades of the aperture; 0 is round
+    #[arg(long, value_name = "N", value_parser = values::blades)]
+    pub blades: Option<u32>,
+    /// Nothing nearer than this depth is drawn, in camera units [default: 1e-4 of the cloud's diagonal]
+    #[arg(long, value_name = "DEPTH", value_parser = values::positive)]
+    pub near: Option<f64>,
+}
+
+/// The samples and the pixels.
+#[derive(Debug, Clone, Args)]
+pub struct SampleArguments {
+    /// Samples a pixel
+    #[arg(long, value_name = "S", default_value_t = 16)]
+    pub spp: u32,
+    /// Only these of the samples, half open
+    #[arg(long, value_name = "A:B", value_parser = values::samples)]
+    pub samples: Option<Range<u32>>,
+    /// Only these pixels, half open
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = values::crop, conflicts_with = "tile")]
+    pub crop: Option<PixelRect>,
+    /// Only tile I (from 0, row by row) of N columns by M rows
+    #[arg(long, value_name = "I/NxM", value_parser = values::tile)]
+    pub tile: Option<Tile>,
+    /// The pixel filter
+    #[arg(long, value_name = "FILTER", default_value = "blackman-harris")]
+    pub filter: FilterChoice,
+    /// The set of sample positions
+    #[arg(long, value_name = "PATTERN", default_value = "sobol")]
+    pub pattern: PatternChoice,
+    /// Seed of the sample positions
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// The splats and their surfaces.
+#[derive(Debug, Clone, Args)]
+pub struct SplatArguments {
+    /// How fragments become a colour
+    #[arg(long, value_name = "RESOLVE", default_value = "surface")]
+    pub resolve: ResolveChoice,
+    /// The shape of a splat's weight [default: windowed; gaussian with --resolve over]
+    #[arg(long, value_name = "KERNEL")]
+    pub kernel: Option<KernelChoice>,
+    /// F: a splat reaches to sqrt(F) sigma [default: 4; 9 with --resolve over]
+    #[arg(long, value_name = "F", value_parser = values::cutoff)]
+    pub cutoff: Option<f64>,
+    /// How the kernel's table is read
+    #[arg(long, value_name = "TABLE", default_value = "lerp256")]
+    pub exp: TableChoice,
+    /// How much of a sample a surface covers [default: opaque]
+    #[arg(long, value_name = "COVERAGE")]
+    pub coverage: Option<CoverageChoice>,
+    /// Sum of weights at which soft coverage is full [default: 1]
+    #[arg(long, value_name = "W", value_parser = values::positive)]
+    pub wsat: Option<f64>,
+    /// Half thickness of a surface in sigma, or listing [default: 0.5]
+    #[arg(long, value_name = "C", value_parser = values::thickness)]
+    pub thickness: Option<ThicknessValue>,
+    /// Draw the fronts of splats only
+    #[arg(long)]
+    pub cull: bool,
+    /// Factor on all sizes, given and estimated
+    #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
+    pub radius_scale: f64,
+    /// How a splat gets its colour
+    #[arg(long, value_name = "SHADING", default_value = "auto")]
+    pub shading: ShadingChoice,
+    /// Linear R,G,B or R,G,B,A behind everything, or none
+    #[arg(long, value_name = "COLOR", value_parser = values::background, default_value = "none")]
+    #[arg(allow_hyphen_values = true)]
+    pub background: Background,
+}
+
+/// What is written besides the picture, and how.
+#[derive(Debug, Clone, Args)]
+pub struct OutputArguments {
+    /// More EXR channels: depth,normal,albedo,position,id,coverage,layers,samples,variance or all
+    #[arg(long, value_name = "LIST", value_parser = values::aovs)]
+    pub aov: Option<AovSelection>,
+    /// Floats of an EXR file
+    #[arg(long, value_name = "TYPE", default_value = "half")]
+    pub exr_type: ExrTypeChoice,
+    /// Lossless compression of an EXR file
+    #[arg(long, value_name = "METHOD", default_value = "zip")]
+    pub exr_compression: CompressionChoice,
+    /// Write what the picture took as JSON; - is stdout
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// The renderer
+    #[arg(long, value_name = "ENGINE", default_value = "reference")]
+    pub engine: EngineChoice,
+    /// Threads (the reference engine uses one)
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+}
+
+/// How talkative the program is.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct TalkArguments {
+    /// Say nothing but errors
+    #[arg(long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say what was assumed, too
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// How progress is shown
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    pub progress: ProgressChoice,
+}
+
+impl TalkArguments {
+    /// Where messages go.
+    pub fn console(self) -> Console {
+        Console { quiet: self.quiet, verbose: self.verbose }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+    use clap::error::ErrorKind;
+
+    fn render(options: &str) -> Result<RenderArguments, ErrorKind> {
+        let line =
+            ["splat", "render", "in.ply", "-o", "out.exr"].into_iter().chain(options.split_whitespace());
+        match Arguments::try_parse_from(line).map_err(|error| error.kind())?.command {
+            Command::Render(arguments) => Ok(*arguments),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn clap_finds_nothing_wrong() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn every_option_of_the_specification_is_there() {
+        let line = "--view front --up z --size 64x48 --spp 8 --samples 0:4 --crop 0,0,8,8 --fstop 8 \
+                    --focus inf --blades 6 --near 0.1 --filter box --pattern poisson --kernel disc \
+                    --cutoff 2 --exp floor256 --resolve surface --coverage soft --wsat 0.9 --thickness \
+                    listing --cull --radius-scale 1.5 --background 0,0,0,1 --aov depth,id --engine \
+                    reference --threads 4 --seed 7 --quiet --progress json --stats - --shading headlight \
+                    --exr-type float --exr-compression piz";
+        let arguments = render(line).unwrap();
+        assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
+        assert_eq!(arguments.samples.samples, Some(0..4));
+        assert_eq!(arguments.outputs.stats, Some(PathBuf::from("-")));
+        render("--camera cam.json --tile 0/2x2 --lens-radius 0.1 -v").unwrap();
+        render("--ortho").unwrap();
+    }
+
+    #[test]
+    fn values_may_begin_with_a_hyphen_where_that_makes_sense() {
+        let arguments = render("--view -30,-20 --up -y --background -1,0,0").unwrap();
+        assert_eq!(arguments.camera.view, Some(ViewDirection { azimuth: -30.0, elevation: -20.0 }));
+        assert_eq!(arguments.camera.up, Some(UpChoice::MinusY));
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let contradictions = [
+            "--camera c.json --size 4x4",
+            "--camera c.json --view front",
+            "--camera c.json --up z",
+            "--camera c.json --ortho",
+            "--ortho --fstop 4",
+            "--ortho --lens-radius 1",
+            "--ortho --focus 1",
+            "--ortho --blades 6",
+            "--crop 0,0,4,4 --tile 0/2x2",
+            "--fstop 4 --lens-radius 1",
+            "--quiet -v",
+        ];
+        for line in contradictions {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ArgumentConflict, "{line}");
+        }
+    }
+
+    #[test]
+    fn wrong_values_are_refused() {
+        for line in ["--size 0x4", "--focus 0", "--aov z", "--wsat 0", "--radius-scale 0", "--view 1"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
+        }
+        for line in ["--up x", "--filter sinc", "--engine gpu"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::InvalidValue, "{line}");
+        }
+    }
+
+    #[test]
+    fn demo_wants_something_to_write() {
+        let parse = |line: &str| Arguments::try_parse_from(line.split_whitespace());
+        assert!(parse("splat demo").is_err());
+        assert!(parse("splat demo -o a.png").is_ok());
+        assert!(parse("splat demo --save-ply a.ply").is_ok());
+    }
+}

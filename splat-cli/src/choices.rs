@@ -1,0 +1,262 @@
+//! Options that are one of a few words, and what they stand for.
+
+use clap::ValueEnum;
+use splat_core::fit::Up;
+use splat_core::{Kernel, PatternKind, PixelFilter, Shading, TableMode};
+
+/// `--up`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpChoice {
+    /// +y up, the front towards +z
+    Y,
+    /// +z up, the front towards -y
+    Z,
+    /// -y up, the front towards -z
+    #[value(name = "-y")]
+    MinusY,
+    /// -z up, the front towards +y
+    #[value(name = "-z")]
+    MinusZ,
+}
+
+impl From<UpChoice> for Up {
+    fn from(choice: UpChoice) -> Self {
+        match choice {
+            UpChoice::Y => Self::Y,
+            UpChoice::Z => Self::Z,
+            UpChoice::MinusY => Self::MinusY,
+            UpChoice::MinusZ => Self::MinusZ,
+        }
+    }
+}
+
+/// `--filter`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FilterChoice {
+    /// The pixel's own square
+    Box,
+    /// A tent of radius 1
+    Tent,
+    /// A Gaussian of sigma 1/2, cut off at 3/2
+    Gaussian,
+    /// The Blackman-Harris window of radius 3/2
+    BlackmanHarris,
+}
+
+impl From<FilterChoice> for PixelFilter {
+    fn from(choice: FilterChoice) -> Self {
+        match choice {
+            FilterChoice::Box => Self::Box,
+            FilterChoice::Tent => Self::Tent,
+            FilterChoice::Gaussian => Self::Gaussian,
+            FilterChoice::BlackmanHarris => Self::BlackmanHarris,
+        }
+    }
+}
+
+/// `--pattern`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PatternChoice {
+    /// Poisson-disc patterns
+    Poisson,
+    /// Owen-scrambled Sobol points
+    Sobol,
+}
+
+impl From<PatternChoice> for PatternKind {
+    fn from(choice: PatternChoice) -> Self {
+        match choice {
+            PatternChoice::Poisson => Self::PoissonDisc,
+            PatternChoice::Sobol => Self::Sobol,
+        }
+    }
+}
+
+/// `--kernel`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KernelChoice {
+    /// exp(-r2/2), which jumps to zero at the rim
+    Gaussian,
+    /// The Gaussian, lowered to reach zero at the rim
+    Windowed,
+    /// 1 inside: hard discs
+    Disc,
+}
+
+impl From<KernelChoice> for Kernel {
+    fn from(choice: KernelChoice) -> Self {
+        match choice {
+            KernelChoice::Gaussian => Self::Gaussian,
+            KernelChoice::Windowed => Self::Windowed,
+            KernelChoice::Disc => Self::Disc,
+        }
+    }
+}
+
+/// `--exp`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TableChoice {
+    /// 256 bins, read at their near edge
+    Floor256,
+    /// 256 bins, read at their middle
+    Midpoint256,
+    /// 256 bins, interpolated linearly
+    Lerp256,
+}
+
+impl From<TableChoice> for TableMode {
+    fn from(choice: TableChoice) -> Self {
+        match choice {
+            TableChoice::Floor256 => Self::Floor256,
+            TableChoice::Midpoint256 => Self::Midpoint256,
+            TableChoice::Lerp256 => Self::Lerp256,
+        }
+    }
+}
+
+/// `--resolve`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ResolveChoice {
+    /// Fragments that overlap in depth are one surface
+    #[default]
+    Surface,
+    /// Every fragment on its own, front to back: trained Gaussian splats
+    Over,
+}
+
+/// `--coverage`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum CoverageChoice {
+    /// A surface covers all of a sample, or nothing
+    #[default]
+    Opaque,
+    /// In proportion to the sum of its weights, up to --wsat
+    Soft,
+}
+
+/// `--shading`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ShadingChoice {
+    /// headlight where the cloud has no colour, else color
+    #[default]
+    Auto,
+    /// The cloud's colours as they are
+    Color,
+    /// Lit by a lamp at the eye
+    Headlight,
+}
+
+impl ShadingChoice {
+    /// The shading of a cloud, given whether it has colours.
+    pub fn shading(self, has_colors: bool) -> Shading {
+        match self {
+            Self::Auto if has_colors => Shading::Color,
+            Self::Auto | Self::Headlight => Shading::Headlight,
+            Self::Color => Shading::Color,
+        }
+    }
+}
+
+/// `--engine`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum EngineChoice {
+    /// The specification in plain scalar code
+    #[default]
+    Reference,
+    /// Not in this version
+    Fast,
+    /// Not in this version
+    Both,
+}
+
+/// `--progress`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ProgressChoice {
+    /// A bar, where stderr is a terminal
+    #[default]
+    Auto,
+    /// A JSON object a line, on stderr
+    Json,
+    /// Nothing
+    None,
+}
+
+/// `--exr-type`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ExrTypeChoice {
+    /// 16 bits (depth, position and counts always have 32)
+    #[default]
+    Half,
+    /// 32 bits
+    Float,
+}
+
+/// `--exr-compression`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum CompressionChoice {
+    /// Largest, fastest
+    None,
+    /// Run lengths
+    Rle,
+    /// Deflate, 16 lines at a time
+    #[default]
+    Zip,
+    /// Deflate, line by line
+    Zips,
+    /// Wavelets: good for noise
+    Piz,
+}
+
+impl From<CompressionChoice> for splat_io::Compression {
+    fn from(choice: CompressionChoice) -> Self {
+        match choice {
+            CompressionChoice::None => Self::None,
+            CompressionChoice::Rle => Self::Rle,
+            CompressionChoice::Zip => Self::Zip,
+            CompressionChoice::Zips => Self::Zips,
+            CompressionChoice::Piz => Self::Piz,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words of a choice, each of which stands for a different value.
+    fn words<T: ValueEnum + PartialEq>() -> Vec<String> {
+        let variants = T::value_variants();
+        let names =
+            variants.iter().map(|variant| variant.to_possible_value().expect("listed").get_name().to_owned());
+        let names: Vec<String> = names.collect();
+        for (name, variant) in names.iter().zip(variants) {
+            assert!(T::from_str(name, false).as_ref() == Ok(variant), "{name}");
+        }
+        assert!(T::from_str("nonsense", false).is_err());
+        names
+    }
+
+    #[test]
+    fn the_words_are_those_of_the_specification() {
+        assert_eq!(words::<UpChoice>(), ["y", "z", "-y", "-z"]);
+        assert_eq!(words::<FilterChoice>(), ["box", "tent", "gaussian", "blackman-harris"]);
+        assert_eq!(words::<PatternChoice>(), ["poisson", "sobol"]);
+        assert_eq!(words::<KernelChoice>(), ["gaussian", "windowed", "disc"]);
+        assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256"]);
+        assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
+        assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
+        assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight"]);
+        assert_eq!(words::<EngineChoice>(), ["reference", "fast", "both"]);
+        assert_eq!(words::<ProgressChoice>(), ["auto", "json", "none"]);
+        assert_eq!(words::<ExrTypeChoice>(), ["half", "float"]);
+        assert_eq!(words::<CompressionChoice>(), ["none", "rle", "zip", "zips", "piz"]);
+    }
+
+    #[test]
+    fn a_cloud_without_colours_gets_a_headlight() {
+        assert_eq!(ShadingChoice::Auto.shading(true), Shading::Color);
+        assert_eq!(ShadingChoice::Auto.shading(false), Shading::Headlight);
+        assert_eq!(ShadingChoice::Color.shading(false), Shading::Color);
+        assert_eq!(ShadingChoice::Headlight.shading(true), Shading::Headlight);
+    }
+}

@@ -1,0 +1,28 @@
+//! `splat info`: what is in a file, and every assumption made in reading it.
+
+mod camera;
+mod cloud;
+
+use crate::arguments::InfoArguments;
+use crate::console;
+use std::path::Path;
+
+/// Runs the command.
+///
+/// # Errors
+/// What the reader says; what the operating system says about stdout.
+pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
+    let (json, text) = if is_camera(&arguments.file) {
+        let summary = camera::Summary::read(&arguments.file)?;
+        (serde_json::to_string_pretty(&summary)?, summary.to_string())
+    } else {
+        let summary = cloud::Summary::read(&arguments.file)?;
+        (serde_json::to_string_pretty(&summary)?, summary.to_string())
+    };
+    Ok(console::data(&if arguments.json { json + "\n" } else { text })?)
+}
+
+/// Whether a file is a camera, by its name.
+fn is_camera(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+}

@@ -1,0 +1,157 @@
+//! The clouds of the command line, read and joined into one.
+
+use anyhow::{Context, bail, ensure};
+use glam::DVec3;
+use splat_core::{Cloud, Shapes};
+use splat_io::{Import, ImportReport, read_ply};
+use std::path::{Path, PathBuf};
+
+/// Reads clouds and joins them: the first file's splats come first.
+///
+/// # Errors
+/// What the reader says; clouds that do not go together.
+pub fn read(paths: &[PathBuf]) -> anyhow::Result<(Cloud, Vec<ImportReport>)> {
+    let imports: Vec<Import> = paths.iter().map(|path| read_ply(path)).collect::<Result<_, _>>()?;
+    let (clouds, reports): (Vec<Cloud>, Vec<ImportReport>) =
+        imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    let named: Vec<(&Path, Cloud)> = reports.iter().map(|report| report.path.as_path()).zip(clouds).collect();
+    Ok((join(named)?, reports))
+}
+
+/// Joins clouds, each with its name for messages.
+///
+/// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
+/// told from another. Missing opacities are opaque; areas are kept only if every cloud has them.
+fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
+    if clouds.len() > 1 {
+        clouds.retain(|(_, cloud)| !cloud.is_empty());
+    }
+    if clouds.len() < 2 {
+        return Ok(clouds.pop().map(|(_, cloud)| cloud).unwrap_or_default());
+    }
+    let worlds =
+        clouds.iter().flat_map(|(_, cloud)| (0..cloud.len()).map(|index| cloud.world_position(index)));
+    let mut joined = Cloud::from_points(&worlds.collect::<Vec<DVec3>>());
+    let normals = |cloud: &Cloud| Some(cloud.normals.clone()).filter(|normals| !normals.is_empty());
+    joined.normals = all_or_none(&clouds, "normals", normals)?.unwrap_or_default();
+    joined.colors = all_or_none(&clouds, "colours", |cloud| cloud.colors.clone())?;
+    if clouds.iter().any(|(_, cloud)| cloud.opacities.is_some()) {
+        let opacities = |cloud: &Cloud| cloud.opacities.clone().unwrap_or_else(|| vec![1.0; cloud.len()]);
+        joined.opacities = Some(clouds.iter().flat_map(|(_, cloud)| opacities(cloud)).collect());
+    }
+    joined.areas =
+        clouds.iter().map(|(_, cloud)| cloud.areas.clone()).collect::<Option<Vec<_>>>().map(|a| a.concat());
+    joined.oriented = clouds.iter().all(|(_, cloud)| cloud.oriented);
+    let discs = all_or_none(&clouds, "round splats", |cloud| match &cloud.shapes {
+        Shapes::Discs(sizes) => Some(sizes.clone()),
+        Shapes::Ellipses(_) => None,
+    })?;
+    let ellipses = all_or_none(&clouds, "elliptical splats", |cloud| match &cloud.shapes {
+        Shapes::Discs(_) => None,
+        Shapes::Ellipses(axes) => Some(axes.clone()),
+    })?;
+    joined.shapes =
+        discs.map(Shapes::Discs).or(ellipses.map(Shapes::Ellipses)).context("clouds of no shape")?;
+    Ok(joined)
+}
+
+/// One property of all clouds, one after the other; `None` if no cloud has it.
+fn all_or_none<T: Clone>(
+    clouds: &[(&Path, Cloud)],
+    what: &str,
+    property: impl Fn(&Cloud) -> Option<Vec<T>>,
+) -> anyhow::Result<Option<Vec<T>>> {
+    let with = clouds.iter().position(|(_, cloud)| property(cloud).is_some());
+    let without = clouds.iter().position(|(_, cloud)| property(cloud).is_none());
+    if let (Some(with), Some(without)) = (with, without) {
+        let [with, without] = [with, without].map(|index| clouds[index].0.display());
+        bail!(
+            "{without}: found no {what}, expected some as in {with}: such clouds cannot be rendered as one"
+        );
+    }
+    Ok(clouds
+        .iter()
+        .map(|(_, cloud)| property(cloud))
+        .collect::<Option<Vec<_>>>()
+        .map(|parts| parts.concat()))
+}
+
+/// Checks that at least one splat of a prepared cloud can be rendered.
+///
+/// # Errors
+/// A sentence that counts the defects.
+pub fn check_usable(cloud: &Cloud, reports: &[ImportReport]) -> anyhow::Result<()> {
+    let names: Vec<String> = reports.iter().map(|report| report.path.display().to_string()).collect();
+    let names = names.join(", ");
+    ensure!(!cloud.is_empty(), "{names}: the cloud is empty");
+    if (0..cloud.len()).any(|index| cloud.defect(index).is_none()) {
+        return Ok(());
+    }
+    let mut causes = std::collections::BTreeMap::new();
+    for defect in (0..cloud.len()).filter_map(|index| cloud.defect(index)) {
+        *causes.entry(defect.name()).or_default() += 1;
+    }
+    bail!("{names}: no usable point in {} ({})", cloud.len(), crate::describe::causes(&causes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn cloud(at: DVec3, count: usize) -> Cloud {
+        let points: Vec<DVec3> = (0..count).map(|i| at + DVec3::X * i as f64).collect();
+        let mut cloud = Cloud::from_points(&points);
+        cloud.normals = vec![Vec3::Z; count];
+        cloud.oriented = true;
+        cloud
+    }
+
+    fn joined(clouds: Vec<Cloud>) -> anyhow::Result<Cloud> {
+        join(clouds.into_iter().map(|cloud| (Path::new("a.ply"), cloud)).collect())
+    }
+
+    #[test]
+    fn clouds_are_joined_in_order_and_far_from_zero() {
+        let (first, second) = (DVec3::new(5e5, 5e6, 0.0), DVec3::new(5e5, 5e6, 9.0));
+        let mut other = cloud(second, 3);
+        other.opacities = Some(vec![0.5; 3]);
+        let all = joined(vec![cloud(first, 2), other]).unwrap();
+        assert!(all.check_lengths().is_ok() && all.oriented);
+        assert_eq!(all.world_position(1), first + DVec3::X);
+        assert_eq!(all.world_position(2), second);
+        assert_eq!(all.opacities, Some(vec![1.0, 1.0, 0.5, 0.5, 0.5]));
+        assert_eq!(all.areas, None);
+    }
+
+    #[test]
+    fn one_cloud_stays_what_it_is_and_empty_ones_say_nothing() {
+        let one = cloud(DVec3::ONE, 2);
+        assert_eq!(joined(vec![one.clone()]).unwrap(), one);
+        assert_eq!(joined(vec![Cloud::default(), one.clone()]).unwrap(), one);
+        assert_eq!(joined(vec![Cloud::default(), Cloud::default()]).unwrap(), Cloud::default());
+    }
+
+    #[test]
+    fn clouds_that_do_not_go_together_are_refused() {
+        let plain = cloud(DVec3::ZERO, 2);
+        let coloured = Cloud { colors: Some(vec![Vec3::ONE; 2]), ..plain.clone() };
+        let bare = Cloud { normals: Vec::new(), ..plain.clone() };
+        let ellipses = Cloud { shapes: Shapes::Ellipses(vec![[Vec3::X, Vec3::Y]; 2]), ..plain.clone() };
+        for (other, what) in [(coloured, "colours"), (bare, "normals"), (ellipses, "splats")] {
+            let message = joined(vec![plain.clone(), other]).unwrap_err().to_string();
+            assert!(message.contains(what), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_cloud_without_a_usable_point_is_refused() {
+        assert!(check_usable(&Cloud::default(), &[]).unwrap_err().to_string().contains("empty"));
+        let mut bad = cloud(DVec3::ZERO, 3);
+        bad.shapes = Shapes::Discs(vec![-1.0, f32::NAN, -1.0]);
+        let message = check_usable(&bad, &[]).unwrap_err().to_string();
+        assert!(message.ends_with("(2 negative_size, 1 not_finite)"), "{message}");
+        bad.shapes = Shapes::Discs(vec![1.0, f32::NAN, -1.0]);
+        assert!(check_usable(&bad, &[]).is_ok());
+    }
+}

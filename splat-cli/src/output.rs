@@ -1,0 +1,53 @@
+//! Output files, checked before the long work starts.
+
+use crate::usage::UsageError;
+use anyhow::bail;
+use splat_core::AovSelection;
+use splat_io::{AtomicFile, PictureFormat};
+use std::path::Path;
+
+/// Checks that a picture with these AOVs can be written there.
+///
+/// # Errors
+/// [`UsageError`] for an unknown extension, and for AOVs in a PNG file; otherwise as [`check_file`].
+pub fn check_picture(path: &Path, aovs: AovSelection) -> anyhow::Result<()> {
+    let format = PictureFormat::from_path(path).map_err(UsageError::new)?;
+    if format == PictureFormat::Png && aovs != AovSelection::default() {
+        let message =
+            format!("{}: a PNG file cannot hold what --aov asks for: write an .exr file", path.display());
+        return Err(UsageError::new(message).into());
+    }
+    check_file(path)
+}
+
+/// Checks that a file can be made there, by making one and throwing it away.
+///
+/// # Errors
+/// A folder that is missing; what the operating system says.
+pub fn check_file(path: &Path) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        bail!("{}: there is no folder {}", path.display(), folder.display());
+    }
+    drop(AtomicFile::create(path)?);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_written_is_known_at_once() {
+        let aovs = AovSelection { depth: true, ..AovSelection::default() };
+        let folder = std::env::temp_dir();
+        let check = |name: &str, aovs| check_picture(&folder.join(name), aovs);
+        assert!(check("splat-check.png", AovSelection::default()).is_ok());
+        assert!(check("splat-check.exr", aovs).is_ok());
+        assert!(check("splat-check.png", aovs).unwrap_err().is::<UsageError>());
+        assert!(check("splat-check.jpg", aovs).unwrap_err().is::<UsageError>());
+        let missing = check("no such folder/x.png", AovSelection::default()).unwrap_err();
+        assert!(!missing.is::<UsageError>() && missing.to_string().contains("no such folder"), "{missing}");
+        assert!(!folder.join("splat-check.png").exists());
+    }
+}

@@ -1,0 +1,329 @@
+//! From raw options to the camera and the options of the renderer.
+//!
+//! What does not need the cloud is settled (and refused) before anything is read: [`options`]. The rest is
+//! settled against the prepared cloud: [`against_cloud`].
+
+use crate::arguments::{CameraArguments, RenderArguments, SampleArguments, SplatArguments};
+use crate::choices::{CoverageChoice, EngineChoice, ResolveChoice};
+use crate::usage::UsageError;
+use crate::values::{ThicknessValue, ViewDirection};
+use glam::DVec3;
+use splat_abuffer::{Coverage, Resolve, Thickness};
+use splat_core::fit::{Framing, NEAR, Up, fit};
+use splat_core::{Camera, Cloud, Kernel, Lens, PixelRect, Projection, RenderOptions};
+
+/// Size of the picture where neither an option nor a camera says anything, in pixels.
+const DEFAULT_SIZE: [u32; 2] = [1280, 960];
+
+/// The three-quarter view.
+const DEFAULT_VIEW: ViewDirection = ViewDirection { azimuth: 30.0, elevation: 20.0 };
+
+/// The options of the renderer, save what depends on the cloud: shading and window.
+///
+/// # Errors
+/// Values out of range, and options that contradict each other.
+pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError> {
+    let CameraArguments { camera, fstop, lens_radius, focus, blades, .. } = &arguments.camera;
+    let has_lens = fstop.is_some() || lens_radius.is_some();
+    if camera.is_none() && !has_lens && (focus.is_some() || blades.is_some()) {
+        return Err(UsageError::new(NEEDS_LENS));
+    }
+    if arguments.outputs.engine != EngineChoice::Reference {
+        return Err(UsageError::new("this version has the reference engine only: use --engine reference"));
+    }
+    let (samples, splats) = (&arguments.samples, &arguments.splats);
+    let (kernel, cutoff) = match splats.resolve {
+        ResolveChoice::Surface => (Kernel::Windowed, 4.0),
+        ResolveChoice::Over => (Kernel::Gaussian, 9.0),
+    };
+    let mut options = RenderOptions {
+        samples: samples.spp,
+        sample_range: samples.samples.clone(),
+        filter: samples.filter.into(),
+        pattern: samples.pattern.into(),
+        seed: samples.seed,
+        kernel: splats.kernel.map_or(kernel, Kernel::from),
+        cutoff: splats.cutoff.unwrap_or(cutoff),
+        table: splats.exp.into(),
+        resolve: resolve_mode(splats)?,
+        cull: splats.cull,
+        background: splats.background.0,
+        aovs: arguments.outputs.aov.unwrap_or_default(),
+        ..RenderOptions::default()
+    };
+    if let Some(ThicknessValue::Factor(factor)) = splats.thickness {
+        options.thickness = factor;
+    }
+    options.check().map_err(UsageError::new)?;
+    Ok(options)
+}
+
+const NEEDS_LENS: &str = "--focus and --blades need a lens: add --fstop or --lens-radius";
+
+/// How fragments become a colour.
+fn resolve_mode(splats: &SplatArguments) -> Result<Resolve, UsageError> {
+    let SplatArguments { resolve, coverage, wsat, thickness, .. } = *splats;
+    if resolve == ResolveChoice::Over {
+        let given = [
+            ("--coverage", coverage.is_some()),
+            ("--wsat", wsat.is_some()),
+            ("--thickness", thickness.is_some()),
+        ];
+        return match given.iter().find(|(_, is_given)| *is_given) {
+            Some((name, _)) => Err(UsageError::new(format!("{name} says nothing with --resolve over"))),
+            None => Ok(Resolve::Over),
+        };
+    }
+    let coverage = match coverage.unwrap_or_default() {
+        CoverageChoice::Soft => Coverage::Soft { saturation: wsat.unwrap_or(1.0) as f32 },
+        CoverageChoice::Opaque if wsat.is_some() => {
+            return Err(UsageError::new("--wsat says nothing without --coverage soft"));
+        }
+        CoverageChoice::Opaque => Coverage::Opaque,
+    };
+    let thickness = match thickness {
+        Some(ThicknessValue::Listing) => Thickness::WholeSplat,
+        _ => Thickness::AroundHit,
+    };
+    Ok(Resolve::Surface { coverage, thickness })
+}
+
+/// The up axis that is assumed: z for a cloud far from zero, which is a map.
+pub fn assumed_up(cloud: &Cloud) -> Up {
+    if cloud.origin == DVec3::ZERO { Up::Y } else { Up::Z }
+}
+
+/// The default near depth for a camera file, in scene units.
+pub fn default_near(cloud: &Cloud) -> f64 {
+    (NEAR * cloud.diagonal()).max(f64::MIN_POSITIVE)
+}
+
+/// The camera, and the complete options, for a prepared cloud. `camera` is the one of the camera file, if
+/// there is one.
+///
+/// # Errors
+/// [`UsageError`] for values that do not go with this cloud or camera; the renderer's own error if the cloud
+/// cannot be shown.
+pub fn against_cloud(
+    arguments: &RenderArguments,
+    mut options: RenderOptions,
+    camera: Option<Camera>,
+    cloud: &Cloud,
+) -> anyhow::Result<(Camera, RenderOptions)> {
+    let mut camera = match camera {
+        Some(camera) => camera,
+        None => fit(cloud, &framing(&arguments.camera, cloud), &options)?,
+    };
+    camera.near = arguments.camera.near.unwrap_or(camera.near);
+    let centre = cloud.bounds().map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    apply_lens(&arguments.camera, &mut camera, centre)?;
+    camera.check().map_err(UsageError::new)?;
+    options.window = window(&arguments.samples, camera.width, camera.height)?;
+    options.shading = arguments.splats.shading.shading(cloud.colors.is_some());
+    Ok((camera, options))
+}
+
+/// From where a fitted camera looks.
+fn framing(arguments: &CameraArguments, cloud: &Cloud) -> Framing {
+    let [width, height] = arguments.size.unwrap_or(DEFAULT_SIZE);
+    let ViewDirection { azimuth, elevation } = arguments.view.unwrap_or(DEFAULT_VIEW);
+    let up = arguments.up.map_or_else(|| assumed_up(cloud), Up::from);
+    Framing { width, height, up, azimuth, elevation, orthographic: arguments.ortho }
+}
+
+/// Gives the camera the lens that the options ask for. What they leave open the camera's own lens decides;
+/// the focus is else on `centre`, a world position. A lens that is only refocused keeps its radius.
+fn apply_lens(arguments: &CameraArguments, camera: &mut Camera, centre: DVec3) -> Result<(), UsageError> {
+    let CameraArguments { fstop, lens_radius, focus, blades, .. } = *arguments;
+    if fstop.is_none() && lens_radius.is_none() && focus.is_none() && blades.is_none() {
+        return Ok(());
+    }
+    let world_to_camera = camera.world_to_camera;
+    let Projection::Perspective { lens, .. } = &mut camera.projection else {
+        return Err(UsageError::new(
+            "an orthographic camera has no lens: --fstop, --lens-radius, --focus, --blades",
+        ));
+    };
+    let focus = match (focus, &lens) {
+        (Some(focus), _) => focus,
+        (None, Some(lens)) => lens.focus,
+        (None, None) => world_to_camera.transform_point3(centre).z,
+    };
+    if focus.is_nan() || focus <= 0.0 {
+        return Err(UsageError::new(
+            "the cloud's centre is not in front of the camera: the lens needs --focus",
+        ));
+    }
+    let blades = blades.or(lens.map(|lens| lens.blades)).unwrap_or(0);
+    *lens = Some(match (lens_radius, fstop, &lens) {
+        (Some(radius), _, _) => Lens { radius, focus, blades },
+        (None, Some(fstop), _) => Lens::from_fstop(fstop, focus, blades),
+        (None, None, Some(lens)) => Lens { radius: lens.radius, focus, blades },
+        (None, None, None) => return Err(UsageError::new(NEEDS_LENS)),
+    });
+    Ok(())
+}
+
+/// The pixels that `--crop` or `--tile` ask for; `None` for all.
+fn window(arguments: &SampleArguments, width: u32, height: u32) -> Result<Option<PixelRect>, UsageError> {
+    let window = match (arguments.crop, arguments.tile) {
+        (Some(crop), _) => crop,
+        (None, Some(tile)) => tile.of_frame(width, height),
+        (None, None) => return Ok(None),
+    };
+    if window.x1 > width as i32 || window.y1 > height as i32 {
+        return Err(UsageError::new(format!("--crop reaches beyond the frame of {width}x{height} pixels")));
+    }
+    if window.is_empty() {
+        return Err(UsageError::new(format!("--tile is empty: the frame has only {width}x{height} pixels")));
+    }
+    Ok(Some(window))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+    use glam::DMat4;
+    use splat_core::Shading;
+
+    fn arguments(line: &str) -> RenderArguments {
+        let line = ["splat", "render", "in.ply", "-o", "out.exr"].into_iter().chain(line.split_whitespace());
+        match Arguments::parse_from(line).command {
+            Command::Render(arguments) => *arguments,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// Nine splats in the plane z = 0, their centre at `centre`.
+    fn cloud(centre: DVec3) -> Cloud {
+        let points: Vec<DVec3> =
+            (0..9).map(|i| centre + DVec3::new(f64::from(i % 3 - 1), f64::from(i / 3 - 1), 0.0)).collect();
+        let mut cloud = Cloud::from_points(&points);
+        splat_core::prepare::prepare(
+            &mut cloud,
+            &splat_core::prepare::PrepareOptions {
+                kernel: Kernel::Windowed,
+                cutoff: 4.0,
+                areas: true,
+                size_scale: 1.0,
+            },
+        );
+        cloud
+    }
+
+    fn resolved(line: &str, cloud: &Cloud) -> anyhow::Result<(Camera, RenderOptions)> {
+        let arguments = arguments(line);
+        against_cloud(&arguments, options(&arguments)?, None, cloud)
+    }
+
+    #[test]
+    fn no_options_are_the_defaults_of_the_renderer() {
+        assert_eq!(options(&arguments("")).unwrap(), RenderOptions::default());
+    }
+
+    #[test]
+    fn defaults_depend_on_the_resolve_and_explicit_options_win() {
+        let over = options(&arguments("--resolve over")).unwrap();
+        assert_eq!((over.kernel, over.cutoff, over.resolve), (Kernel::Gaussian, 9.0, Resolve::Over));
+        let mixed = options(&arguments("--resolve over --kernel disc --cutoff 1")).unwrap();
+        assert_eq!((mixed.kernel, mixed.cutoff), (Kernel::Disc, 1.0));
+    }
+
+    #[test]
+    fn surfaces_can_be_soft_and_as_in_the_listing() {
+        let soft = options(&arguments("--coverage soft --wsat 0.75 --thickness listing")).unwrap();
+        let expected = Resolve::Surface {
+            coverage: Coverage::Soft { saturation: 0.75 },
+            thickness: Thickness::WholeSplat,
+        };
+        assert_eq!(soft.resolve, expected);
+        assert_eq!(options(&arguments("--thickness 0.25")).unwrap().thickness, 0.25);
+    }
+
+    #[test]
+    fn contradictions_are_refused_before_anything_is_read() {
+        let contradictions = [
+            "--engine fast",
+            "--engine both",
+            "--focus 3",
+            "--blades 6",
+            "--wsat 1",
+            "--coverage opaque --wsat 1",
+            "--resolve over --thickness 1",
+            "--resolve over --coverage soft",
+            "--spp 0",
+            "--spp 8 --samples 4:9",
+            "--spp 2000 --pattern poisson",
+        ];
+        for line in contradictions {
+            assert!(options(&arguments(line)).is_err(), "{line}");
+        }
+    }
+
+    #[test]
+    fn maps_have_z_up() {
+        assert_eq!(assumed_up(&cloud(DVec3::ZERO)), Up::Y);
+        assert_eq!(assumed_up(&cloud(DVec3::new(5e5, 5e6, 100.0))), Up::Z);
+    }
+
+    #[test]
+    fn the_camera_is_fitted_and_the_lens_focused_on_the_centre() {
+        let cloud = cloud(DVec3::new(0.0, 0.0, -7.0));
+        let (camera, options) =
+            resolved("--view front --size 64x48 --lens-radius 0.25 --blades 5", &cloud).unwrap();
+        assert_eq!((camera.width, camera.height), (64, 48));
+        assert_eq!(options.shading, Shading::Headlight);
+        let lens = camera.lens().unwrap();
+        assert_eq!((lens.radius, lens.blades), (0.25, 5));
+        assert!((lens.focus - (camera.eye().z + 7.0)).abs() < 1e-9, "{lens:?} {}", camera.eye());
+        let (camera, _) = resolved("--fstop 2 --focus inf --near 0.5", &cloud).unwrap();
+        assert_eq!(camera.lens(), Some(Lens { radius: 0.25, focus: f64::INFINITY, blades: 0 }));
+        assert_eq!(camera.near, 0.5);
+    }
+
+    #[test]
+    fn options_override_the_lens_of_a_camera_file() {
+        let cloud = cloud(DVec3::new(0.0, 0.0, 5.0));
+        let own = Lens { radius: 0.5, focus: 3.0, blades: 7 };
+        let camera = |lens| Camera {
+            width: 8,
+            height: 8,
+            projection: Projection::Perspective { focal_length: glam::DVec2::splat(8.0), lens },
+            principal_point: glam::DVec2::splat(4.0),
+            world_to_camera: DMat4::IDENTITY,
+            near: 0.1,
+            far: f64::INFINITY,
+            clip_planes: Vec::new(),
+        };
+        let lens_of = |line: &str, lens| {
+            let arguments = arguments(&format!("--camera c.json {line}"));
+            let options = options(&arguments).unwrap();
+            against_cloud(&arguments, options, Some(camera(lens)), &cloud).map(|(camera, _)| camera.lens())
+        };
+        assert_eq!(lens_of("", Some(own)).unwrap(), Some(own));
+        assert_eq!(lens_of("--focus 4", Some(own)).unwrap(), Some(Lens { focus: 4.0, ..own }));
+        assert_eq!(lens_of("--lens-radius 1", Some(own)).unwrap(), Some(Lens { radius: 1.0, ..own }));
+        assert_eq!(
+            lens_of("--lens-radius 1", None).unwrap(),
+            Some(Lens { radius: 1.0, focus: 5.0, blades: 0 })
+        );
+        assert!(lens_of("--blades 5", None).unwrap_err().is::<UsageError>());
+        assert!(lens_of("--near 1e9 --focus 4", Some(own)).is_ok());
+    }
+
+    #[test]
+    fn windows_lie_within_the_frame() {
+        let cloud = cloud(DVec3::ZERO);
+        let window = |line: &str| {
+            resolved(&format!("--size 100x90 {line}"), &cloud).map(|(_, options)| options.window)
+        };
+        assert_eq!(window("").unwrap(), None);
+        assert_eq!(window("--crop 0,0,100,90").unwrap(), Some(PixelRect::new(0, 0, 100, 90)));
+        assert_eq!(window("--tile 5/4x3").unwrap(), Some(PixelRect::new(25, 30, 50, 60)));
+        for line in ["--crop 0,0,101,90", "--crop 100,0,120,9", "--tile 0/200x1"] {
+            assert!(window(line).unwrap_err().is::<UsageError>(), "{line}");
+        }
+    }
+}
