@@ -48,6 +48,7 @@ impl TileBuffer {
 
     /// Groups the fragments by sample, in order of arrival within each.
     pub fn group(&mut self) {
+        self.starts.clear();
         self.starts.resize(self.samples + 1, 0);
         for &(sample, _) in &self.stream {
             self.starts[sample as usize + 1] += 1;

@@ -109,9 +109,9 @@ pub struct CameraArguments {
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     pub size: Option<[u32; 2]>,
     /// f-number of a thin lens whose image plane is at distance 1, in camera units
-    #[arg(long, value_name = "N", value_parser = values::positive, conflicts_with = "lens_radius")]
+    #[arg(long, value_name = "N", value_parser = values::positive)]
     pub fstop: Option<f64>,
-    /// Radius of a thin lens, in camera units (scene units where the camera is fitted)
+    /// Radius of a thin lens, in scene units; overrides --fstop
     #[arg(long, value_name = "R", value_parser = values::positive)]
     pub lens_radius: Option<f64>,
     /// Depth in focus, in camera units, or inf [default: that of the cloud's centre]
@@ -289,7 +289,6 @@ mod tests {
             "--ortho --focus 1",
             "--ortho --blades 6",
             "--crop 0,0,4,4 --tile 0/2x2",
-            "--fstop 4 --lens-radius 1",
             "--quiet -v",
         ];
         for line in contradictions {

@@ -138,7 +138,7 @@ fn apply_lens(arguments: &CameraArguments, camera: &mut Camera, centre: DVec3) -
     if fstop.is_none() && lens_radius.is_none() && focus.is_none() && blades.is_none() {
         return Ok(());
     }
-    let world_to_camera = camera.world_to_camera;
+    let (world_to_camera, scale) = (camera.world_to_camera, camera.scale());
     let Projection::Perspective { lens, .. } = &mut camera.projection else {
         return Err(UsageError::new(
             "an orthographic camera has no lens: --fstop, --lens-radius, --focus, --blades",
@@ -156,7 +156,7 @@ fn apply_lens(arguments: &CameraArguments, camera: &mut Camera, centre: DVec3) -
     }
     let blades = blades.or(lens.map(|lens| lens.blades)).unwrap_or(0);
     *lens = Some(match (lens_radius, fstop, &lens) {
-        (Some(radius), _, _) => Lens { radius, focus, blades },
+        (Some(radius), _, _) => Lens { radius: radius * scale, focus, blades },
         (None, Some(fstop), _) => Lens::from_fstop(fstop, focus, blades),
         (None, None, Some(lens)) => Lens { radius: lens.radius, focus, blades },
         (None, None, None) => return Err(UsageError::new(NEEDS_LENS)),

@@ -93,6 +93,13 @@ impl Camera {
         DMat3::from_mat4(self.world_to_camera)
     }
 
+    /// Camera units a scene unit: the cube root of the linear part's determinant, and exactly 1 where it is within
+    /// 10^-6 of that, as it is for rotations written with few digits.
+    pub fn scale(&self) -> f64 {
+        let scale = libm::cbrt(self.linear().determinant().abs());
+        if (scale - 1.0).abs() < 1e-6 { 1.0 } else { scale }
+    }
+
     /// World position of the eye (perspective) or of the camera-space origin (orthographic), found by solving
     /// M eye = 0, since M may carry scale.
     pub fn eye(&self) -> DVec3 {

@@ -71,6 +71,8 @@ pub enum Defect {
     NegativeSize,
     /// The size is zero, and nothing estimated it.
     UnknownSize,
+    /// The area that it stands for is zero or negative.
+    NoArea,
 }
 
 impl Defect {
@@ -81,6 +83,7 @@ impl Defect {
             Self::ZeroNormal => "zero_normal",
             Self::NegativeSize => "negative_size",
             Self::UnknownSize => "unknown_size",
+            Self::NoArea => "no_area",
         }
     }
 }
@@ -161,6 +164,7 @@ impl Cloud {
             Shapes::Ellipses(axes) if axes[index][0].cross(axes[index][1]) == Vec3::ZERO => {
                 Some(Defect::ZeroNormal)
             }
+            _ if self.areas.as_ref().is_some_and(|areas| areas[index] <= 0.0) => Some(Defect::NoArea),
             _ => None,
         }
     }

@@ -133,7 +133,7 @@ impl<'a> PixelResolver<'a> {
 
     /// The world normal of a splat; where normals do not tell the outside, the one that faces the eye.
     fn facing_normal(&self, index: usize) -> DVec3 {
-        let normal = self.cloud.normals[index].as_dvec3();
+        let normal = self.cloud.normals[index].as_dvec3().normalize();
         if self.cloud.oriented {
             return normal;
         }

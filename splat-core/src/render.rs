@@ -4,7 +4,7 @@ use crate::pixel::PixelResolver;
 use crate::raster::{Rasterizer, SamplePlace};
 use crate::setup::{SetUp, View, VisibleSplat, set_up};
 use crate::{Camera, Cloud, Error, Film, PixelRect, RenderOptions};
-use splat_abuffer::{Fragment, TileBuffer};
+use splat_abuffer::{Fragment, MAX_RANK, TileBuffer};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -118,6 +118,9 @@ impl Frame {
         camera.check()?;
         options.check()?;
         cloud.check_lengths()?;
+        if cloud.len() > MAX_RANK as usize {
+            return Err(Error::invalid("cloud", cloud.len(), "fewer than 2^31 splats"));
+        }
         if cloud.normals.len() != cloud.len() {
             return Err(Error::Length { what: "normals", found: 0, expected: cloud.len() });
         }

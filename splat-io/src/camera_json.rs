@@ -8,11 +8,11 @@
 //! | `width`, `height` | pixels of the full frame |
 //! | `fx`, `fy` | pinhole: focal length, in pixels |
 //! | `pixels_per_unit` | orthographic: pixels a camera unit |
-//! | `cx`, `cy` | principal point, in pixels; the first pixel's centre is at 0.5 |
+//! | `cx`, `cy` | principal point, in pixels; the first pixel's centre is at 0.5; orthographic: absent is the middle |
 //! | `world_to_camera` | 4 rows of 4 numbers, for column vectors: p_camera = M p_world |
-//! | `near`, `far` | range of depth, in camera units; absent or null: the caller's default, and infinity |
+//! | `near`, `far` | range of depth, in camera units; absent or null: 1e-4 of the cloud's diagonal, and infinity |
 //! | `fstop` | f-number of a thin lens whose image plane is at 1; absent or null: no lens |
-//! | `lens_radius` | radius of a thin lens, in camera units; overrides `fstop` |
+//! | `lens_radius` | radius of a thin lens, in scene units; overrides `fstop` |
 //! | `focus` | depth of the plane of focus, in camera units; null: infinity; needed with a lens |
 //! | `blades` | 3 or more straight blades of the aperture; 0 or absent: round |
 //!
@@ -50,8 +50,10 @@ struct CameraJson {
     fy: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pixels_per_unit: Option<f64>,
-    cx: f64,
-    cy: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cx: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cy: Option<f64>,
     world_to_camera: [[f64; 4]; 4],
     #[serde(skip_serializing_if = "Option::is_none")]
     near: Option<f64>,
@@ -75,7 +77,7 @@ fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f
 
 /// Reads a camera from a JSON file. See the [module](self) for the fields.
 ///
-/// `default_near` is the near depth, in camera units, where the file has none: 1e-4 of the cloud's diagonal.
+/// `default_near` is the near depth, in scene units, where the file has none: 1e-4 of the cloud's diagonal.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Limit`] beyond 1 MiB; [`Error::Invalid`] if it is no UTF-8; otherwise as
@@ -104,18 +106,38 @@ pub fn read_camera_json(path: &Path, default_near: f64) -> Result<Camera, Error>
 pub fn parse_camera_json(text: &str, path: &Path, default_near: f64) -> Result<Camera, Error> {
     let json: CameraJson =
         serde_json::from_str(text).map_err(|cause| Error::Json { path: path.to_owned(), cause })?;
-    let camera = Camera {
+    let mut camera = Camera {
         width: json.width,
         height: json.height,
         projection: projection(&json, path)?,
-        principal_point: DVec2::new(json.cx, json.cy),
+        principal_point: principal_point(&json, path)?,
         world_to_camera: DMat4::from_cols_array_2d(&json.world_to_camera).transpose(),
-        near: json.near.unwrap_or(default_near),
+        near: default_near,
         far: json.far.unwrap_or(f64::INFINITY),
         clip_planes: Vec::new(),
     };
+    // Lengths given in scene units become those of the camera.
+    let scale = camera.scale();
+    camera.near = json.near.unwrap_or(default_near * scale);
+    if let (Projection::Perspective { lens: Some(lens), .. }, Some(radius)) =
+        (&mut camera.projection, json.lens_radius)
+    {
+        lens.radius = radius * scale;
+    }
     camera.check().map_err(Error::core(path))?;
     Ok(camera)
+}
+
+/// The principal point: needed by a pinhole, else the middle of the frame unless given.
+fn principal_point(json: &CameraJson, path: &Path) -> Result<DVec2, Error> {
+    let coordinate = |field, value: Option<f64>, side: u32| match (value, json.model) {
+        (Some(value), _) => Ok(value),
+        (None, Model::Orthographic) => Ok(0.5 * f64::from(side)),
+        (None, Model::Pinhole) => {
+            Err(Error::invalid(path, Place::Field(field), "nothing", "a number: the model is pinhole"))
+        }
+    };
+    Ok(DVec2::new(coordinate("cx", json.cx, json.width)?, coordinate("cy", json.cy, json.height)?))
 }
 
 fn projection(json: &CameraJson, path: &Path) -> Result<Projection, Error> {
@@ -194,13 +216,13 @@ pub fn write_camera_json(path: &Path, camera: &Camera) -> Result<(), Error> {
         fx: focal_length.map(|focal_length| focal_length.x),
         fy: focal_length.map(|focal_length| focal_length.y),
         pixels_per_unit,
-        cx: camera.principal_point.x,
-        cy: camera.principal_point.y,
+        cx: Some(camera.principal_point.x),
+        cy: Some(camera.principal_point.y),
         world_to_camera: camera.world_to_camera.transpose().to_cols_array_2d(),
         near: Some(camera.near),
         far: finite(camera.far),
         fstop: None,
-        lens_radius: lens.map(|lens| lens.radius),
+        lens_radius: lens.map(|lens| lens.radius / camera.scale()),
         focus: lens.map(|lens| finite(lens.focus)),
         blades: lens.map(|lens| lens.blades).filter(|&blades| blades > 0),
     };
@@ -246,6 +268,27 @@ mod tests {
         let p = camera.world_to_camera * DVec4::new(1.0, 2.0, 3.0, 1.0);
         assert_eq!(p, DVec4::new(11.0, 17.0, 32.0, 1.0));
         assert_eq!(camera.eye(), DVec3::new(-10.0, -30.0, 20.0));
+    }
+
+    #[test]
+    fn lengths_in_scene_units_follow_the_matrix() {
+        // A camera in millimetres for a scene in metres.
+        let text = pinhole(r#", "lens_radius": 0.02, "focus": 3000"#).replace(
+            "[1, 0, 0, 10], [0, 0, -1, 20], [0, 1, 0, 30]",
+            "[1e3, 0, 0, 1], [0, 0, -1e3, 2], [0, 1e3, 0, 3]",
+        );
+        let camera = parse(&text).unwrap();
+        let lens = camera.lens().unwrap();
+        assert!((camera.near - 250.0).abs() < 1e-9 && (lens.radius - 20.0).abs() < 1e-12, "{camera:?}");
+        assert_eq!(lens.focus, 3000.0);
+    }
+
+    #[test]
+    fn an_orthographic_camera_looks_at_the_middle() {
+        let text = format!(
+            r#"{{"model": "orthographic", "width": 640, "height": 480, "pixels_per_unit": 10, {MATRIX}}}"#
+        );
+        assert_eq!(parse(&text).unwrap().principal_point, DVec2::new(320.0, 240.0));
     }
 
     #[test]
@@ -301,7 +344,7 @@ mod tests {
         assert!(unknown.contains("unknown field `fov`, expected one of `model`, `width`"), "{unknown}");
         assert!(unknown.contains("line 3 column"), "{unknown}");
         assert!(message(&pinhole(r#", "cx": 1"#)).contains("duplicate field `cx`"));
-        assert!(message(&pinhole("").replace("\"cx\": 320,", "")).contains("missing field `cx`"));
+        assert!(message(&pinhole("").replace("\"cx\": 320,", "")).contains("cx: found nothing"));
         assert!(message(&pinhole("").replace("\"fx\": 500,", "")).contains("field fx: found nothing"));
         assert!(message(&pinhole("").replace("640", "-1")).contains("expected u32"));
         assert!(message(&pinhole("").replace("640", "0")).contains("camera width: found 0"));

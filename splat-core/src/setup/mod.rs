@@ -11,14 +11,14 @@ mod view;
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
 pub use projection::project;
+pub(crate) use view::Reach;
 pub use view::View;
 
 use crate::evaluate::SplatConstants;
 use crate::options::Shading;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
 use glam::{DVec3, Vec3, Vec3Swizzles};
-use margin::margin;
-use splat_abuffer::{MAX_RANK, Resolve, SplatSurface, Thickness};
+use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
@@ -84,7 +84,7 @@ const EDGE_ON: &str = "edge_on";
 /// Sets up every splat of a cloud whose normals are known.
 pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
     let mut result = SetUp::default();
-    for index in 0..cloud.len().min(MAX_RANK as usize) {
+    for index in 0..cloud.len() {
         if let Some(defect) = cloud.defect(index) {
             *result.dropped.entry(defect.name()).or_default() += 1;
             continue;
@@ -113,17 +113,26 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
     if (options.cull && faces_away(&splat, view)) || view.is_clipped(&splat, radius) {
         return Outcome::Culled;
     }
-    let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
-    let depth = view.depth_extent(&splat, radius);
-    let Some(usual) = screen_box(&splat, radius * (1.0 + margin::USUAL), view) else {
-        return Outcome::Culled;
-    };
-    let reach = view.reach(exact.pixel(), &usual);
-    let Some(margin) = margin(&splat, &exact, depth, reach, view) else { return Outcome::EdgeOn };
-    let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::Culled };
-    let bounds = view.candidates(&screen);
+    let usual = radius * (1.0 + margin::USUAL);
+    // What is in front of the near plane has a box, unless it is a line.
+    let Some(screen) = screen_box(&splat, usual, view) else { return Outcome::EdgeOn };
+    let mut bounds = candidates(&splat, &screen, usual, view);
     if bounds.is_empty() {
         return Outcome::Culled;
+    }
+    let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
+    let depth = view.depth_extent(&splat, radius);
+    let reach = view.reach(exact.pixel(), &screen);
+    let margin = match view.lens_pixels() {
+        Some(lens_pixels) => margin::with_lens(&exact, depth, &reach, lens_pixels, view),
+        None => match margin::without_lens(&exact, depth, &reach, view) {
+            Some(margin) => margin,
+            None => return Outcome::EdgeOn,
+        },
+    };
+    if margin.radius > usual {
+        let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::EdgeOn };
+        bounds = candidates(&splat, &screen, margin.radius, view);
     }
     let constants = SplatConstants { edge_on: margin.edge_on, ..exact }.to_f32();
     if !constants.is_finite() {
@@ -193,10 +202,9 @@ fn faces_away(splat: &CameraSplat, view: &View) -> bool {
     -splat.normal.dot(splat.center) + lens_radius * splat.normal.xy().length() < 0.0 || view.orthographic
 }
 
-/// The exact box of a disc of `radius` sigma on the picture, blur and pixel filter left out: `[x, y]` in pixels,
-/// widened by the circle of confusion (L137-147, corrected).
+/// The exact box of a disc of `radius` sigma as a pinhole sees it: `[x, y]` in pixels (L106-125, corrected). `None` if
+/// the disc is nearer than the near plane.
 fn screen_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 2]> {
-    let blur = view.circle_of_confusion(view.depth_extent(splat, radius));
     let side = |axis: usize| {
         let extent = if view.orthographic {
             Some(orthographic_extent(splat, radius, axis))
@@ -204,11 +212,21 @@ fn screen_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 
             perspective_extent(splat, radius, view.box_near(), axis)
         };
         extent.map(|extent| Extent {
-            min: (extent.min - blur) * view.pixel_scale[axis] + view.principal_point[axis],
-            max: (extent.max + blur) * view.pixel_scale[axis] + view.principal_point[axis],
+            min: extent.min * view.pixel_scale[axis] + view.principal_point[axis],
+            max: extent.max * view.pixel_scale[axis] + view.principal_point[axis],
         })
     };
     Some([side(0)?, side(1)?])
+}
+
+/// The pixels of the window in which a disc of `radius` sigma with this box may be hit: the box widened by the circle
+/// of confusion and the pixel filter (L137-159, corrected).
+fn candidates(splat: &CameraSplat, screen: &[Extent; 2], radius: f64, view: &View) -> PixelRect {
+    let blur = view.circle_of_confusion(view.depth_extent(splat, radius));
+    view.pixels_that_reach(&[0, 1].map(|axis| {
+        let blur = blur * view.pixel_scale[axis];
+        Extent { min: screen[axis].min - blur, max: screen[axis].max + blur }
+    }))
 }
 
 /// The factor from the kernel's value to a fragment's weight: area / (|T1 x T2| I), so that the weights of a

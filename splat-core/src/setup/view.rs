@@ -3,7 +3,7 @@
 use super::bounds::{Extent, half_depth};
 use super::{BOX_PADDING, CameraSplat};
 use crate::{Camera, Lens, PixelRect, RenderOptions};
-use glam::{DMat3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
+use glam::{DMat3, DVec2, DVec3, DVec4, Vec4Swizzles};
 
 /// A camera as set-up sees it.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,8 @@ pub struct View {
     pub cutoff: f64,
     /// Radius of the pixel filter, in pixels.
     pub filter_radius: f64,
+    /// Width and height of the full frame, in pixels.
+    pub frame: [u32; 2],
     /// The pixels to render.
     pub window: PixelRect,
     clip_planes: Vec<DVec4>,
@@ -57,6 +59,7 @@ impl View {
             far: camera.far,
             cutoff: options.cutoff,
             filter_radius: options.filter.radius(),
+            frame: [camera.width, camera.height],
             window: options.window.map_or(frame, |window| window.intersect(&frame)),
             clip_planes: camera.clip_planes.iter().map(|&plane| to_camera * plane).collect(),
         }
@@ -70,12 +73,6 @@ impl View {
     /// The near plane that boxes are clipped at: a little in front, since a hit's depth is rounded.
     pub(super) fn box_near(&self) -> f64 {
         self.near * (1.0 - 1.0 / 65_536.0)
-    }
-
-    /// Where a point of camera space falls on the picture, in pixels.
-    pub fn project(&self, point: DVec3) -> DVec2 {
-        let screen = if self.orthographic { point.xy() } else { point.xy() / point.z };
-        screen * self.pixel_scale + self.principal_point
     }
 
     /// Whether the splat lies wholly outside one of the planes: near, far, and the caller's (L71-84).
@@ -105,21 +102,30 @@ impl View {
         })
     }
 
-    /// The largest offsets, in pixels, of a sample in the window and in a box (in pixels) from a point.
-    pub(super) fn reach(&self, from: DVec2, screen: &[Extent; 2]) -> [f64; 2] {
-        let low = [self.window.x0, self.window.y0];
-        let high = [self.window.x1, self.window.y1];
-        [0, 1].map(|axis| {
-            let room = self.filter_radius + 1.0;
-            let min = screen[axis].min.max(f64::from(low[axis])) - room;
-            let max = screen[axis].max.min(f64::from(high[axis])) + room;
-            (min - from[axis]).abs().max((max - from[axis]).abs())
-        })
+    /// Radius of the lens in pixels at depth 1, per axis.
+    pub(super) fn lens_pixels(&self) -> Option<[f64; 2]> {
+        self.lens.map(|lens| (lens.radius * self.pixel_scale).to_array())
+    }
+
+    /// How far samples may be from the projection of a splat's reference point, given the splat's box in pixels.
+    pub(super) fn reach(&self, from: DVec2, screen: &[Extent; 2]) -> Reach {
+        let room = self.filter_radius + 1.0;
+        let farthest = |axis: usize, min: f64, max: f64| {
+            (min - room - from[axis]).abs().max((max + room - from[axis]).abs())
+        };
+        let frame = self.frame.map(f64::from);
+        let lens = self.lens.map_or(DVec2::ZERO, |lens| lens.radius / lens.focus * self.pixel_scale);
+        Reach {
+            of_splat: [0, 1].map(|axis| farthest(axis, screen[axis].min, screen[axis].max)),
+            in_frame: [0, 1]
+                .map(|axis| farthest(axis, screen[axis].min.max(0.0), screen[axis].max.min(frame[axis]))),
+            lens_over_focus: lens.to_array(),
+        }
     }
 
     /// The pixels of the window of which a sample may fall into a box (in pixels). Pixel i's samples lie within the
     /// filter's radius of i + 1/2.
-    pub(super) fn candidates(&self, screen: &[Extent; 2]) -> PixelRect {
+    pub(super) fn pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let room = self.filter_radius + BOX_PADDING;
         // Casts saturate, and the window is far smaller than their range.
         let first = |extent: Extent| (extent.min - room - 0.5).ceil() as i32;
@@ -127,4 +133,16 @@ impl View {
         let [x, y] = *screen;
         PixelRect::new(first(x), first(y), end(x), end(y)).intersect(&self.window)
     }
+}
+
+/// Largest offsets per axis, in pixels, from the projection of a splat's reference point. They depend on the frame, never
+/// on the window: a crop must not change what is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reach {
+    /// Of the splat's points, as a pinhole sees them.
+    pub of_splat: [f64; 2],
+    /// Of samples in the frame that a pinhole's hit may have.
+    pub in_frame: [f64; 2],
+    /// Radius of the lens over the focus: what a lens point shifts a sample by.
+    pub lens_over_focus: [f64; 2],
 }
