@@ -1,0 +1,210 @@
+//! The program from outside: exit codes, files, messages.
+
+use glam::{DMat4, DVec2, DVec3};
+use splat_core::{Camera, Cloud, Projection, Shapes};
+use splat_io::{PlyEncoding, write_camera_json, write_ply};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_splat");
+
+/// Runs the program in `folder`.
+fn splat(folder: &Path, arguments: &str) -> Output {
+    Command::new(PROGRAM).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+/// Runs the program, which must succeed.
+fn succeeds(folder: &Path, arguments: &str) -> Output {
+    let output = splat(folder, arguments);
+    assert!(output.status.success(), "splat {arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// Runs the program, which must fail with this code. Returns its message.
+fn fails(folder: &Path, arguments: &str, code: i32) -> String {
+    let output = splat(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "splat {arguments}: {message}");
+    message
+}
+
+/// Width, height and RGBA bytes of a PNG file.
+fn read_png(path: &Path) -> (u32, u32, Vec<[u8; 4]>) {
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
+    decoder.set_transformations(png::Transformations::ALPHA);
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let pixels = bytes[..info.buffer_size()].chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
+    (info.width, info.height, pixels)
+}
+
+/// An evenly covered sphere of radius 1 at `centre`, with colours.
+fn sphere(centre: DVec3) -> Cloud {
+    let count = 2000;
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let directions: Vec<DVec3> = (0..count)
+        .map(|i| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
+            let (sin, cos) = (golden_angle * f64::from(i)).sin_cos();
+            DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+        })
+        .collect();
+    let points: Vec<DVec3> = directions.iter().map(|direction| centre + direction).collect();
+    let mut cloud = Cloud::from_points(&points);
+    cloud.normals = directions.iter().map(|direction| direction.as_vec3()).collect();
+    cloud.colors = Some(directions.iter().map(|direction| (0.5 + 0.5 * direction).as_vec3()).collect());
+    cloud.shapes = Shapes::Discs(vec![0.08; directions.len()]);
+    cloud.oriented = true;
+    cloud
+}
+
+/// A camera 4 units in front of `centre`.
+fn camera(centre: DVec3) -> Camera {
+    Camera {
+        width: 320,
+        height: 240,
+        projection: Projection::Perspective { focal_length: DVec2::splat(380.0), lens: None },
+        principal_point: DVec2::new(160.0, 120.0),
+        world_to_camera: DMat4::from_translation(-(centre - 4.0 * DVec3::Z)),
+        near: 0.01,
+        far: f64::INFINITY,
+        clip_planes: Vec::new(),
+    }
+}
+
+#[test]
+fn the_demo_needs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), "demo -o demo.png --size 160x90 --spp 2");
+    let (width, height, pixels) = read_png(&folder.path().join("demo.png"));
+    assert_eq!((width, height), (160, 90));
+    let mut colors = pixels;
+    colors.sort_unstable();
+    colors.dedup();
+    assert!(colors.len() > 1000, "{} colours", colors.len());
+}
+
+#[test]
+fn a_picture_without_any_option_shows_the_whole_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Binary).unwrap();
+    let output = succeeds(folder.path(), "render in.ply -o out.png --stats stats.json");
+    assert!(output.stdout.is_empty());
+    let (width, height, pixels) = read_png(&folder.path().join("out.png"));
+    let alpha = |x: u32, y: u32| pixels[(y * width + x) as usize][3];
+    // The sphere fills the height but for the margin, touches no border, and has no hole.
+    assert!((0..width).all(|x| alpha(x, 0) == 0 && alpha(x, height - 1) == 0));
+    assert!((height / 10..height * 9 / 10).all(|y| alpha(width / 2, y) == 255));
+    let stats: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.path().join("stats.json")).unwrap()).unwrap();
+    for key in ["splats", "tests", "fragments", "samples", "threads", "isa", "seconds", "peak_bytes"] {
+        assert!(!stats[key].is_null(), "{key} in {stats}");
+    }
+    assert_eq!(stats["splats"]["read"], 2000);
+    assert_eq!(stats["samples"], 1280 * 960 * 16);
+    for key in ["read", "prepare", "setup", "bin", "raster", "resolve", "write", "total"] {
+        assert!(stats["seconds"][key].is_number(), "{key} in {stats}");
+    }
+}
+
+#[test]
+fn map_coordinates_change_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let shift = DVec3::new(500_000.0, 5_000_000.0, 100.0);
+    for (name, at) in [("near", DVec3::ZERO), ("far", shift)] {
+        write_ply(&folder.path().join(format!("{name}.ply")), &sphere(at), PlyEncoding::Binary).unwrap();
+        write_camera_json(&folder.path().join(format!("{name}.json")), &camera(at)).unwrap();
+        succeeds(folder.path(), &format!("render {name}.ply -o {name}.png --camera {name}.json"));
+    }
+    let [(_, _, near), (_, _, far)] = ["near.png", "far.png"].map(|name| read_png(&folder.path().join(name)));
+    let same = |(a, b): (&[u8; 4], &[u8; 4])| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 2);
+    let agree = near.iter().zip(&far).filter(|&pair| same(pair)).count();
+    assert!(near.iter().any(|pixel| pixel[3] == 255));
+    assert!(agree as f64 >= 0.999 * near.len() as f64, "{agree} of {}", near.len());
+}
+
+#[test]
+fn exit_codes_and_messages_tell_who_is_to_blame() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("bad.ply"),
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+    )
+    .unwrap();
+    write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Ascii).unwrap();
+    let usage = [
+        "render in.ply",
+        "render in.ply -o out.jpg",
+        "render in.ply -o out.png --spp none",
+        "render in.ply -o out.png --aov depth",
+        "render in.ply -o out.png --engine fast",
+        "render in.ply -o out.png --kernel cubic",
+        "paint in.ply",
+    ];
+    for arguments in usage {
+        assert!(!fails(folder.path(), arguments, 2).is_empty(), "{arguments}");
+    }
+    assert!(fails(folder.path(), "render none.ply -o out.png", 1).contains("none.ply"));
+    assert!(fails(folder.path(), "render in.ply -o none/out.png", 1).contains("none"));
+    let message = fails(folder.path(), "render bad.ply -o out.png", 1);
+    assert!(
+        message.contains("bad.ply") && message.contains('y') && message.contains("expected"),
+        "{message}"
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
+}
+
+#[test]
+fn a_claim_of_a_billion_points_fails_at_once_in_little_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let header = format!(
+            "ply\nformat {format} 1.0\nelement vertex 1000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n"
+        );
+        fs::write(folder.path().join("huge.ply"), header).unwrap();
+        for command in ["info huge.ply", "render huge.ply -o out.png"] {
+            // The whole address space, program and libraries included, is held to 50 MB (ulimit counts in KiB).
+            let line = format!("ulimit -v 48828 && exec {PROGRAM} {command}");
+            let start = Instant::now();
+            let output = Command::new("sh").current_dir(folder.path()).args(["-c", &line]).output().unwrap();
+            let time = start.elapsed();
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{command}: {message}");
+            assert!(message.contains("1000000000") && message.contains("vertex"), "{message}");
+            assert!(time < Duration::from_millis(100), "{command}: {time:?}");
+        }
+    }
+}
+
+/// The folder of real files, if there is one.
+fn real_files() -> Option<PathBuf> {
+    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
+}
+
+#[test]
+fn real_files_are_rendered_or_refused_and_never_a_panic() {
+    let Some(data) = real_files() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.png");
+    for entry in fs::read_dir(data.join("tricky_ply")).unwrap() {
+        let path = entry.unwrap().path();
+        let run = Command::new(PROGRAM)
+            .args(["render", "--size", "64x48", "--spp", "4", "-o"])
+            .args([&output, &path])
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&run.stderr);
+        match run.status.code() {
+            Some(0) => fs::remove_file(&output).unwrap(),
+            Some(1) => {
+                let name = path.file_name().unwrap().to_string_lossy();
+                assert!(message.contains(&*name) && !output.exists(), "{message}");
+                assert!(!message.contains("panicked"), "{message}");
+            }
+            code => panic!("{}: {code:?}: {message}", path.display()),
+        }
+    }
+}
