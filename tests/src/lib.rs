@@ -3,9 +3,11 @@
 //! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
 //! - [`random`]: deterministic random numbers for scenes;
+//! - [`scenes`]: small scenes made in code;
 //! - [`tolerances`]: every tolerance with its derivation.
 
 pub mod brute_force;
 pub mod listing;
 pub mod random;
+pub mod scenes;
 pub mod tolerances;

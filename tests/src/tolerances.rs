@@ -103,3 +103,158 @@ pub const DOUBLE_OF_SINGLE: f64 = 2e-6;
 /// Sums of truncated Gaussians over a grid of .8 sigma (E33) against their integral: the table's bias at F =
 /// 4 is .78 % at most, and the truncated rim's ripple is 1 % of the sum. Measured: .7 %.
 pub const GRID_SUM: f64 = 0.02;
+
+// ---------------------------------------------------------------------------------------------------------
+// The resolve and closed-form pictures. eps32 = 2^-24, the rounding error of an f32 operation.
+
+/// The rounding error of one f32 operation.
+const EPS32: f32 = f32::EPSILON / 2.0;
+
+/// A sample's colour or transmittance, relative to its brightest channel or to 1, from `fragments` fragments
+/// by one order of sums against another. A layer of m: the sum of weights is off by m + 1 eps32, the opacity
+/// (a quotient of two such) by 2 m + 4, alpha by 3 m + 7, the colour's quotient by 2 m + 5. Over all layers
+/// the transmittance is off by the sum of their alphas' errors, at most 10 n, the colour by at most 24 n; and
+/// there are two of them. Measured: 4.8e-7 of a bound of 2.8e-5.
+pub fn resolve_rounding(fragments: usize) -> f32 {
+    48.0 * fragments as f32 * EPS32
+}
+
+/// A covered area in pixels, summed over samples, `samples` a pixel, of an outline of `perimeter` pixels. An
+/// edge crosses about 4/pi pixels a pixel of its length; in each the covered part p has a variance of p (1 -
+/// p) / samples, 1/6 in the mean over p (.23 with the tent's wider edge). Four standard deviations of
+/// independent samples, which well-distributed ones undercut. Measured: .12 of it.
+pub fn area_of_samples(perimeter: f64, samples: u32) -> f64 {
+    4.0 * (perimeter * 4.0 / std::f64::consts::PI * 0.234 / f64::from(samples)).sqrt()
+}
+
+/// The centroid of an outline of `perimeter` pixels, by the centres of pixels. An error of the area stands on
+/// the outline, at most a quarter of the perimeter from the middle, divided by sqrt(2) for one axis of both;
+/// and the centre of a pixel on the edge is .2 pixel (rms) off the middle of what is covered of it, always
+/// outwards, which cancels but for a random rest: another .2 of four square roots of the pixels on the edge.
+/// Measured: .10 of it.
+pub fn centroid_of_samples(perimeter: f64, area: f64, samples: u32) -> f64 {
+    let pixels = perimeter * 4.0 / std::f64::consts::PI;
+    (area_of_samples(perimeter, samples) * perimeter / 4.0 / std::f64::consts::SQRT_2
+        + 4.0 * 0.2 * pixels.sqrt())
+        / area
+}
+
+/// How far the edge of a disc of 6000 pixels' radius may seem to be off in a pixel: it leans by 12/6000 from
+/// one side of a pixel to the other at the corners of a picture of 24 pixels, and f32 places it to 3 * 6000 *
+/// 2^-24 = 1.1e-3.
+const EDGE: f64 = 12.0 / 6000.0 + 1.1e-3;
+
+/// The covered part of a pixel at an edge along an axis, from 256 samples of which one lies in each of 256
+/// strips: 1/256, and the edge itself. Measured: 3.9e-3.
+pub const STRAIGHT_EDGE: f64 = 1.0 / 256.0 + EDGE;
+
+/// The same for a slanted edge. One of 256 samples lies in each of 16 x 16 squares, of which the edge crosses
+/// at most 31; each adds a variance of 1/6 of a sample: five deviations, sqrt(31/6) = 2.2733. Measured:
+/// 1.3e-2.
+pub const SLANTED_EDGE: f64 = 5.0 * 2.2733 / 256.0 + EDGE;
+
+/// The sum of a splat's weights, relative, by 16 samples a pixel. The Gaussian of F = 4 jumps by .31 of its
+/// mean at a rim of 160 pixels' length: as [`area_of_samples`], .31 times 6.9 pixels of the 2060 covered:
+/// 1.0e-3. Measured: 3.2e-5.
+pub const SUM_OF_WEIGHTS: f64 = 1e-3;
+
+/// The greatest weight of a splat of sigma 12.8 pixels, found as the mean over the pixel nearest to the
+/// centre, whose samples are up to 1.1 pixels off: r2/2 < 3.7e-3, times 1.16 for the windowed kernel.
+/// Measured: 7.0e-4.
+pub const PEAK_OF_WEIGHTS: f64 = 4.3e-3;
+
+/// A constant colour from at most `overlap` fragments a sample: a layer's colour is off by 2 m + 5 roundings,
+/// alpha (as 1 - T, T near 1) by 3 m + 8. Measured: 2.4e-7 of a bound of 6.8e-6.
+pub fn constant_colour(overlap: usize) -> f32 {
+    (5.0 * overlap as f32 + 13.0) * EPS32
+}
+
+/// Two layers and a background: some ten f32 operations on numbers below 2. Measured: 0.
+pub const COMPOSITE: f32 = 20.0 * EPS32;
+
+/// Two Gaussians in display space: the lerp table's error at F = 16, (16/256)^2/32 = 1.2e-4, times the
+/// opacity and twice the slope of sRGB's decoding (2.4 at most); a fragment at the 1/255 threshold may fall
+/// to either side: 1/255 of a sample of 4. Measured: 1.0e-4.
+pub const OVER_PICTURE: f64 = 1.2e-4 * 2.0 * 2.4 + 1.0 / 255.0 / 4.0;
+
+/// The depth of a plane at a sample, relative: 1 + (h0 dx + h1 dy) over a picture of 48 pixels has terms
+/// below twice g, four roundings each, then a division and a product, and the rounding to the film. Measured:
+/// 9.6e-8 (a mean of 64 samples).
+pub const PLANE_DEPTH: f64 = 20.0 * EPS32 as f64;
+
+/// A position within 16 units: its depth by [`PLANE_DEPTH`], its coordinates rounded to f32. Measured:
+/// 3.1e-7.
+pub const PLANE_POSITION: f64 = 16.0 * (PLANE_DEPTH + EPS32 as f64);
+
+/// Where the mean position of 16 samples falls: one sample in each of 16 strips, so within 1/32 pixel, and as
+/// much again for the mean of w x/w, w changing by 2 % a pixel. Measured: 1.1e-2.
+pub const PLANE_PIXEL: f64 = 1.0 / 16.0;
+
+/// A unit vector rounded to f32, and normalised before.
+pub const UNIT_VECTOR: f64 = 4.0 * EPS32 as f64;
+
+/// A count of hits where so many are expected: four deviations of a Poisson distribution. Measured: .19 of
+/// it.
+pub fn deviations_of_count(expected: f64) -> f64 {
+    4.0 * expected.sqrt()
+}
+
+/// A second moment along an axis from so many hits, relative: x^2 has a relative variance of 1 on a disc (and
+/// on a polygon of it 1.4 at most); four deviations. Measured: .21 of it.
+pub fn deviations_of_moment(hits: f64) -> f64 {
+    4.0 * (1.4 / hits).sqrt()
+}
+
+/// The mean along an axis of so many hits of this variance: four deviations. Measured: .28 of it.
+pub fn deviations_of_mean(variance: f64, hits: f64) -> f64 {
+    4.0 * (variance / hits).sqrt()
+}
+
+/// The farthest pixel, by its centre, of 12,000 hits of a disc of 7.5 pixels and more blurred by one of 1.5,
+/// relative to the sum of both: the density falls to 0 over the last 3 pixels, so that a dozen hits lie
+/// within .7 pixel of the rim. Their pixels' centres lie before and behind them. Measured: 1.021 at least.
+pub const FARTHEST_PIXEL: f64 = 1.0 - 0.7 / 9.0;
+
+/// The mean over a unit sphere of the sum of weights, its splats' sigma being `sigma`. Areas are set so that
+/// the kernels sum to 1 at every centre, by the distance in space; rays meet the splats' planes, which leave
+/// the sphere by r^2/2. Both differ by parts of sigma^2: some twice that, its mean square radius being 2
+/// sigma^2 at most. And between the centres the sum is another than at them: 1.5 %. Measured: .0313, .0408,
+/// .0532 at sigma .142 (bound .064), .0005, .0095, .0058 at .050 (bound .021), for windowed F = 4, Gaussian F
+/// = 4, windowed F = 9.
+pub fn mean_weight(sigma: f64) -> f64 {
+    0.015 + 2.4 * sigma * sigma
+}
+
+/// Its standard deviation. Sigma is one spacing, so F = 4 holds 4 pi = 12.6 centres, and a centre at the rim
+/// of the plain Gaussian weighs e^-2 / (2 pi (1 - e^-2)) = .025: two of them come and go. Measured: .033
+/// (Gaussian, F = 4), .020 (windowed).
+pub const SPREAD_OF_WEIGHT: f64 = 0.05;
+
+/// r2 at the rim (1) of a disc of 15 pixels seen through a lens: numbers of 30 pixels, ten roundings of 2^-24
+/// each, over 15 pixels, doubled by the square, times 4 for the tilt.
+pub const LENS_R2: f64 = 30.0 * 10.0 / 15.0 * 2.0 * 4.0 * EPS32 as f64;
+
+/// Pixels whose samples lie so near to a rim that the rounding of a lens ray in focus decides: the f32
+/// evaluation is uncertain to 1e-5 pixel or so, the rims are 400 pixels long with 8 samples a pixel: .03
+/// samples. Measured: 0.
+pub const IN_FOCUS_PIXELS: usize = 2;
+
+/// A share near a half of so many hits: four deviations of a binomial distribution. Measured: .08 of it.
+pub fn deviations_of_share(hits: f64) -> f64 {
+    4.0 * 0.5 / hits.sqrt()
+}
+
+/// A variance below 1/15 from sums of 16 squares in f64, rounded to f32.
+pub const VARIANCE: f32 = 1e-8;
+
+/// Values of an `over` film in display space, below 1.1: a film's f32 rounding, in a part and in the whole,
+/// times the slope of sRGB's encoding relative to its value (at most 1), and alpha's. Measured: 3.4e-8.
+pub const DISPLAY_SPACE: f64 = 8.0 * EPS32 as f64;
+
+/// The part of the pixels that may differ by more than 2/255 when the world is shifted: the issue's 0.1 %.
+/// Positions move by 1e-7 of the cloud's extent, so only samples on the very edge of a splat can change.
+pub const SHIFTED_PIXELS: f64 = 1e-3;
+
+/// Share of the interior pixels of a closed surface that may be less than .99 opaque at 16 samples. Not derived: it is
+/// what the project promises for surfels made from meshes, a quarter of what its first issue allows.
+pub const INTERIOR_HOLES: f64 = 0.00025;
