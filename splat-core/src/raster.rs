@@ -108,9 +108,9 @@ impl Rasterizer {
                     let Some(hit) = evaluate(offset, lens, sample) else { continue };
                     let back = splat.back != (hit.flipped && splat.flips);
                     let weight = splat.weight_scale * self.table.weight(hit.r2);
-                    let fragment = Fragment::new(hit.depth, weight, rank, back);
-                    if fragment.is_admitted() && !(self.cull && back) {
-                        sink(SamplePlace { x, y, sample }, fragment);
+                    // Finite by construction: near < depth < far, and both factors of the weight are bounded.
+                    if weight > 0.0 && !(self.cull && back) {
+                        sink(SamplePlace { x, y, sample }, Fragment::new(hit.depth, weight, rank, back));
                     }
                 }
             }
