@@ -7,6 +7,8 @@
 //! The result depends on the *set* of fragments only, never on the order in which they arrived: see
 //! docs/specification.md, section 6.
 
+#![forbid(unsafe_code)]
+
 mod fragment;
 mod resolve;
 mod storage;

@@ -1,5 +1,7 @@
 //! Scenes for the benchmarks.
 
+#![forbid(unsafe_code)]
+
 use glam::{DMat4, DVec2, DVec3};
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, Kernel, PixelFilter, Projection, RenderOptions, Shapes};
@@ -27,13 +29,13 @@ pub fn sphere(count: usize) -> Cloud {
     cloud
 }
 
-/// The camera of the sphere: 1920 x 1080, 90 degrees across the height, at a distance of 2.17, so that the sphere's
-/// radius is about 280 pixels.
+/// The camera of the sphere: 1920 x 1080, 90 degrees across the width, at a distance of 2.17, so that the sphere's
+/// radius is about 500 pixels.
 pub fn sphere_camera() -> Camera {
     Camera {
         width: 1920,
         height: 1080,
-        projection: Projection::Perspective { focal_length: DVec2::splat(540.0), lens: None },
+        projection: Projection::Perspective { focal_length: DVec2::splat(960.0), lens: None },
         principal_point: DVec2::new(960.0, 540.0),
         world_to_camera: DMat4::from_translation(DVec3::new(0.0, 0.0, 2.17)),
         near: 0.01,

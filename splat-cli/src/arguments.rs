@@ -164,7 +164,7 @@ pub struct SplatArguments {
     #[arg(long, value_name = "F", value_parser = values::cutoff)]
     pub cutoff: Option<f64>,
     /// How the kernel's table is read
-    #[arg(long, value_name = "TABLE", default_value = "lerp256")]
+    #[arg(long, value_name = "TABLE", default_value = "quartic8")]
     pub exp: TableChoice,
     /// How much of a sample a surface covers [default: opaque]
     #[arg(long, value_name = "COVERAGE")]
@@ -206,9 +206,9 @@ pub struct OutputArguments {
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// The renderer
-    #[arg(long, value_name = "ENGINE", default_value = "reference")]
+    #[arg(long, value_name = "ENGINE", default_value = "fast")]
     pub engine: EngineChoice,
-    /// Threads (the reference engine uses one)
+    /// Threads; 0 is one a processor (the reference engine uses one) [default: 0]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
 }

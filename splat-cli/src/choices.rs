@@ -102,6 +102,8 @@ pub enum TableChoice {
     Midpoint256,
     /// 256 bins, interpolated linearly
     Lerp256,
+    /// 8 polynomials of degree 4
+    Quartic8,
 }
 
 impl From<TableChoice> for TableMode {
@@ -110,6 +112,7 @@ impl From<TableChoice> for TableMode {
             TableChoice::Floor256 => Self::Floor256,
             TableChoice::Midpoint256 => Self::Midpoint256,
             TableChoice::Lerp256 => Self::Lerp256,
+            TableChoice::Quartic8 => Self::Quartic8,
         }
     }
 }
@@ -160,12 +163,12 @@ impl ShadingChoice {
 /// `--engine`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum EngineChoice {
-    /// The specification in plain scalar code
-    #[default]
+    /// The specification in plain scalar code, on one thread
     Reference,
-    /// Not in this version
+    /// Eight samples at once, on all threads: the same bits
+    #[default]
     Fast,
-    /// Not in this version
+    /// Both side by side, up to the first fragment that differs; then a picture by the fast one
     Both,
 }
 
@@ -242,7 +245,7 @@ mod tests {
         assert_eq!(words::<FilterChoice>(), ["box", "tent", "gaussian", "blackman-harris"]);
         assert_eq!(words::<PatternChoice>(), ["poisson", "sobol"]);
         assert_eq!(words::<KernelChoice>(), ["gaussian", "windowed", "disc"]);
-        assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256"]);
+        assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8"]);
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
         assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
         assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight"]);

@@ -6,6 +6,8 @@ mod scene;
 mod surfaces;
 
 use crate::arguments::DemoArguments;
+use crate::choices::EngineChoice;
+use crate::engine::Engine;
 use crate::output;
 use crate::progress::Progress;
 use crate::render::{metadata, summary};
@@ -46,10 +48,9 @@ pub fn run(arguments: &DemoArguments) -> anyhow::Result<()> {
         write_camera_json(path, &camera)?;
     }
     let Some(path) = &arguments.output else { return Ok(()) };
-    let (rendered, _) =
-        progress.stage("render", |update| splat_core::render(&cloud, &camera, &options, update));
-    let rendered = rendered?;
-    let metadata = metadata(&camera, &options);
+    let mut engine = Engine::new(EngineChoice::Fast, None, console)?;
+    let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
+    let metadata = metadata(&camera, &options, &engine);
     let (written, _) =
         progress.stage("write", |_| write_picture(path, &rendered.film, &metadata, &ExrOptions::default()));
     written?;

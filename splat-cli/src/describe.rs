@@ -28,6 +28,7 @@ pub fn options(options: &RenderOptions) -> String {
         TableMode::Floor256 => "floor256",
         TableMode::Midpoint256 => "midpoint256",
         TableMode::Lerp256 => "lerp256",
+        TableMode::Quartic8 => "quartic8",
     };
     let resolve = match options.resolve {
         Resolve::Over => "over".to_owned(),

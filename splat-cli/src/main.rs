@@ -3,11 +3,14 @@
 //! Data go to stdout; progress, summaries, warnings and errors go to stderr. Exit codes: 0 success, 1
 //! failure, 2 usage, 130 interrupted.
 
+#![forbid(unsafe_code)]
+
 mod arguments;
 mod choices;
 mod console;
 mod demo;
 mod describe;
+mod engine;
 mod info;
 mod inputs;
 mod output;

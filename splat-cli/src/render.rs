@@ -3,6 +3,7 @@
 use crate::arguments::{OutputArguments, RenderArguments};
 use crate::choices::ExrTypeChoice;
 use crate::console::Console;
+use crate::engine::Engine;
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
 use crate::{describe, inputs, output, resolve};
@@ -27,11 +28,12 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         output::check_file(path)?;
     }
 
+    let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
     let (input, time) = progress.stage("read", |_| inputs::read(&arguments.inputs));
     times.read = time;
     let (mut cloud, reports) = input?;
-    note_assumptions(console, arguments, &cloud, &reports);
+    note_assumptions(console, &cloud, &reports);
     let camera_path = arguments.camera.camera.as_deref();
     let camera = camera_path.map(|path| read_camera_json(path, resolve::default_near(&cloud))).transpose()?;
 
@@ -47,11 +49,9 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     inputs::check_usable(&cloud, &reports)?;
     let (camera, options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
 
-    let (rendered, _) =
-        progress.stage("render", |update| splat_core::render(&cloud, &camera, &options, update));
-    let rendered = rendered?;
+    let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-    let metadata = Metadata { input_hash: Some(hashes.join(" ")), ..metadata(&camera, &options) };
+    let metadata = Metadata { input_hash: Some(hashes.join(" ")), ..metadata(&camera, &options, &engine) };
     let (written, time) = progress.stage("write", |_| {
         write_picture(&arguments.output, &rendered.film, &metadata, &exr_options(&arguments.outputs))
     });
@@ -63,13 +63,13 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     warn_of_losses(console, &rendered.statistics);
     console.summary(summary(read, &rendered.statistics, times.total.as_secs_f64(), &arguments.output));
     if let Some(path) = &arguments.outputs.stats {
-        Report::new(read, &rendered.statistics, times).write(path)?;
+        Report::new(read, &rendered.statistics, times, &engine).write(path)?;
     }
     Ok(())
 }
 
 /// Says what was assumed of files and cloud, if anyone wants to know.
-fn note_assumptions(console: Console, arguments: &RenderArguments, cloud: &Cloud, reports: &[ImportReport]) {
+fn note_assumptions(console: Console, cloud: &Cloud, reports: &[ImportReport]) {
     for report in reports {
         for assumption in &report.assumptions {
             console.note(format_args!("{}: {assumption}", report.path.display()));
@@ -78,20 +78,17 @@ fn note_assumptions(console: Console, arguments: &RenderArguments, cloud: &Cloud
     for assumption in describe::assumptions(cloud) {
         console.note(assumption);
     }
-    if arguments.outputs.threads.is_some_and(|threads| threads != 1) {
-        console.note("the reference engine uses one thread, whatever --threads says");
-    }
 }
 
 /// What the picture file says about how it was made, save the input.
-pub fn metadata(camera: &Camera, options: &RenderOptions) -> Metadata {
+pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Metadata {
     Metadata {
         software: Some(concat!("splat ", env!("CARGO_PKG_VERSION")).to_owned()),
         world_to_camera: Some(camera.world_to_camera),
         samples: Some(options.samples),
         sample_range: options.sample_range.clone(),
         seed: Some(options.seed),
-        engine: Some("reference".to_owned()),
+        engine: Some(engine.name().to_owned()),
         options: Some(describe::options(options)),
         input_hash: None,
     }

@@ -4,7 +4,7 @@
 //! settled against the prepared cloud: [`against_cloud`].
 
 use crate::arguments::{CameraArguments, RenderArguments, SampleArguments, SplatArguments};
-use crate::choices::{CoverageChoice, EngineChoice, ResolveChoice};
+use crate::choices::{CoverageChoice, ResolveChoice};
 use crate::usage::UsageError;
 use crate::values::{ThicknessValue, ViewDirection};
 use glam::DVec3;
@@ -27,9 +27,6 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
     let has_lens = fstop.is_some() || lens_radius.is_some();
     if camera.is_none() && !has_lens && (focus.is_some() || blades.is_some()) {
         return Err(UsageError::new(NEEDS_LENS));
-    }
-    if arguments.outputs.engine != EngineChoice::Reference {
-        return Err(UsageError::new("this version has the reference engine only: use --engine reference"));
     }
     let (samples, splats) = (&arguments.samples, &arguments.splats);
     let (kernel, cutoff) = match splats.resolve {
@@ -245,8 +242,6 @@ mod tests {
     #[test]
     fn contradictions_are_refused_before_anything_is_read() {
         let contradictions = [
-            "--engine fast",
-            "--engine both",
             "--focus 3",
             "--blades 6",
             "--wsat 1",

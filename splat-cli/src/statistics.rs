@@ -1,6 +1,7 @@
 //! The statistics file: what a picture took, as JSON.
 
 use crate::console;
+use crate::engine::Engine;
 use serde::Serialize;
 use splat_core::Statistics;
 use splat_io::AtomicFile;
@@ -76,15 +77,15 @@ pub struct Times {
 }
 
 impl Report {
-    /// The report of a picture by the reference renderer, from a cloud of `read` splats.
-    pub fn new(read: usize, statistics: &Statistics, times: Times) -> Self {
+    /// The report of a picture by this engine, from a cloud of `read` splats.
+    pub fn new(read: usize, statistics: &Statistics, times: Times, engine: &Engine) -> Self {
         Self {
             splats: Splats { read, dropped: statistics.dropped.clone(), drawn: statistics.drawn },
             tests: statistics.tests,
             fragments: statistics.fragments,
             samples: statistics.samples,
-            threads: 1,
-            isa: "scalar",
+            threads: engine.threads(),
+            isa: engine.isa(),
             seconds: Seconds {
                 read: times.read.as_secs_f64(),
                 prepare: times.prepare.as_secs_f64(),
@@ -138,7 +139,13 @@ mod tests {
     #[test]
     fn the_names_are_those_of_the_specification() {
         let statistics = Statistics { dropped: [("edge_on", 2)].into(), drawn: 7, ..Statistics::default() };
-        let json = serde_json::to_value(Report::new(9, &statistics, Times::default())).unwrap();
+        let engine = Engine::new(
+            crate::choices::EngineChoice::Reference,
+            None,
+            console::Console { quiet: true, verbose: false },
+        )
+        .unwrap();
+        let json = serde_json::to_value(Report::new(9, &statistics, Times::default(), &engine)).unwrap();
         let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
         let expected = ["fragments", "isa", "peak_bytes", "samples", "seconds", "splats", "tests", "threads"];
         assert_eq!(keys(&json), expected);

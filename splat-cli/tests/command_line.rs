@@ -127,6 +127,23 @@ fn map_coordinates_change_nothing() {
 }
 
 #[test]
+fn the_engines_write_the_same_file() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Binary).unwrap();
+    let line = "render in.ply --size 160x120 --spp 9 --lens-radius 0.1 --stats stats.json";
+    let mut pictures = Vec::new();
+    for engine in ["reference", "fast --threads 1", "fast --threads 3", "both"] {
+        succeeds(folder.path(), &format!("{line} -o out.png --engine {engine}"));
+        pictures.push(read_png(&folder.path().join("out.png")));
+    }
+    assert!(pictures.iter().all(|picture| *picture == pictures[0]));
+    let stats = fs::read_to_string(folder.path().join("stats.json")).unwrap();
+    assert!(!stats.contains("scalar"), "{stats}");
+    let said = succeeds(folder.path(), &format!("{line} -o out.png --engine both -v"));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("agree on all"));
+}
+
+#[test]
 fn exit_codes_and_messages_tell_who_is_to_blame() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(
@@ -140,7 +157,7 @@ fn exit_codes_and_messages_tell_who_is_to_blame() {
         "render in.ply -o out.jpg",
         "render in.ply -o out.png --spp none",
         "render in.ply -o out.png --aov depth",
-        "render in.ply -o out.png --engine fast",
+        "render in.ply -o out.png --engine slow",
         "render in.ply -o out.png --kernel cubic",
         "paint in.ply",
     ];

@@ -137,6 +137,21 @@ impl Film {
         }
     }
 
+    /// Copies another film, whose window lies within this one's and which holds the same channels.
+    pub fn paste(&mut self, part: &Self) {
+        let target = (self.window, part.window);
+        paste(&mut self.rgba, &part.rgba, target);
+        paste_optional(&mut self.depth, part.depth.as_deref(), target);
+        paste_optional(&mut self.normal, part.normal.as_deref(), target);
+        paste_optional(&mut self.albedo, part.albedo.as_deref(), target);
+        paste_optional(&mut self.position, part.position.as_deref(), target);
+        paste_optional(&mut self.id, part.id.as_deref(), target);
+        paste_optional(&mut self.coverage, part.coverage.as_deref(), target);
+        paste_optional(&mut self.layers, part.layers.as_deref(), target);
+        paste_optional(&mut self.samples, part.samples.as_deref(), target);
+        paste_optional(&mut self.variance, part.variance.as_deref(), target);
+    }
+
     /// Width of the window, in pixels.
     pub fn width(&self) -> usize {
         self.window.width()
@@ -150,5 +165,22 @@ impl Film {
     /// Index of the frame's pixel (x, y) in the arrays; it must lie in the window.
     pub fn index(&self, x: i32, y: i32) -> usize {
         (y - self.window.y0) as usize * self.width() + (x - self.window.x0) as usize
+    }
+}
+
+/// Copies a channel of the window `part` into that of the window `whole`, row by row.
+fn paste<T: Copy>(to: &mut [T], from: &[T], (whole, part): (PixelRect, PixelRect)) {
+    let left = (part.x0 - whole.x0) as usize;
+    let top = (part.y0 - whole.y0) as usize;
+    for (row, values) in from.chunks_exact(part.width().max(1)).enumerate() {
+        let start = (top + row) * whole.width() + left;
+        to[start..start + values.len()].copy_from_slice(values);
+    }
+}
+
+/// [`paste`] for a channel that may not be there.
+fn paste_optional<T: Copy>(to: &mut Option<Vec<T>>, from: Option<&[T]>, windows: (PixelRect, PixelRect)) {
+    if let (Some(to), Some(from)) = (to, from) {
+        paste(to, from, windows);
     }
 }

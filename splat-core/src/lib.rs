@@ -1,5 +1,7 @@
 //! The reference surfel renderer: the specification (docs/specification.md) as plain scalar Rust.
 
+#![forbid(unsafe_code)]
+
 pub mod camera;
 pub mod cloud;
 pub mod error;
@@ -8,7 +10,7 @@ pub mod film;
 pub mod fit;
 pub mod kernel;
 pub mod options;
-mod pixel;
+pub mod pixel;
 pub mod prepare;
 pub mod raster;
 pub mod real;

@@ -23,7 +23,7 @@ pub struct PixelResolver<'a> {
     background: Option<[f32; 4]>,
     resolver: Resolver,
     splats: &'a [VisibleSplat],
-    surfaces: Vec<SplatSurface>,
+    surfaces: &'a [SplatSurface],
     sums: Sums,
 }
 
@@ -45,13 +45,14 @@ struct Sums {
 }
 
 impl<'a> PixelResolver<'a> {
-    /// A resolver for a frame with these splats, by rank.
+    /// A resolver for a frame with these splats and what their fragments share, both by rank.
     pub fn new(
         cloud: &'a Cloud,
         camera: &Camera,
         options: &RenderOptions,
         view: &'a View,
         splats: &'a [VisibleSplat],
+        surfaces: &'a [SplatSurface],
     ) -> Self {
         Self {
             cloud,
@@ -62,7 +63,7 @@ impl<'a> PixelResolver<'a> {
             display_space: options.resolve == Resolve::Over,
             background: options.background,
             resolver: Resolver::new(options.resolve),
-            surfaces: splats.iter().map(|splat| splat.surface).collect(),
+            surfaces,
             splats,
             sums: Sums::default(),
         }
@@ -75,21 +76,26 @@ impl<'a> PixelResolver<'a> {
 
     /// Adds the next sample, given its fragments.
     pub fn add(&mut self, place: SamplePlace, fragments: &mut [Fragment], samples: &SampleTable) {
-        self.sums.samples += 1;
         let sample = if fragments.is_empty() {
             SampleColor { color: [0.0; 3], transmittance: 1.0, uncovered: 1.0 }
         } else {
-            self.resolver.resolve(fragments, &self.surfaces)
+            self.resolver.resolve(fragments, self.surfaces)
         };
+        self.add_color(&sample);
+        if !fragments.is_empty() {
+            self.add_aovs(place, fragments, samples);
+        }
+    }
+
+    /// Adds the next sample, already resolved; enough where no AOV is wanted but variance, coverage and samples.
+    pub fn add_color(&mut self, sample: &SampleColor) {
+        self.sums.samples += 1;
         for (channel, value) in sample.color.map(f64::from).into_iter().enumerate() {
             self.sums.color[channel] += value;
             self.sums.color_squared[channel] += value * value;
         }
         self.sums.transmittance += f64::from(sample.transmittance);
         self.sums.uncovered += f64::from(sample.uncovered);
-        if !fragments.is_empty() {
-            self.add_aovs(place, fragments, samples);
-        }
     }
 
     /// Adds to the sums what only the AOVs need.

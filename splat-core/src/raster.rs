@@ -20,10 +20,13 @@ pub struct Rasterizer {
 }
 
 /// Which form of the evaluation the camera needs.
-#[derive(Debug, Clone, Copy)]
-enum Form {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// [`crate::evaluate::SplatConstants::pinhole`].
     Pinhole,
+    /// [`crate::evaluate::SplatConstants::thin_lens`].
     ThinLens,
+    /// [`crate::evaluate::SplatConstants::orthographic`].
     Orthographic,
 }
 
@@ -59,6 +62,26 @@ impl Rasterizer {
     /// The sample positions.
     pub fn samples(&self) -> &SampleTable {
         &self.samples
+    }
+
+    /// The table of the kernel.
+    pub fn table(&self) -> &KernelTable {
+        &self.table
+    }
+
+    /// Which hits count.
+    pub fn limits(&self) -> &Limits<f32> {
+        &self.limits
+    }
+
+    /// The form of the evaluation that the camera needs.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// Whether backs are not drawn.
+    pub fn culls(&self) -> bool {
+        self.cull
     }
 
     /// The indices of the samples that are taken.

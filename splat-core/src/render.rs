@@ -56,14 +56,15 @@ pub fn render(
     options: &RenderOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Rendered, Error> {
-    let frame = Frame::new(cloud, camera, options)?;
+    let frame = Frame::new(cloud, camera, options, set_up)?;
     let window = frame.view.window;
     let start = Instant::now();
-    let tiles = bin(&frame.set_up.splats, &window);
+    let tiles = tiles(&frame.set_up.splats, &window);
+    let surfaces = frame.set_up.surfaces();
     let mut picture = Picture {
         frame: &frame,
         film: Film::new([camera.width, camera.height], window, options.aovs),
-        pixels: PixelResolver::new(cloud, camera, options, &frame.view, &frame.set_up.splats),
+        pixels: PixelResolver::new(cloud, camera, options, &frame.view, &frame.set_up.splats, &surfaces),
         buffer: TileBuffer::default(),
         budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
         statistics: Statistics {
@@ -95,7 +96,7 @@ pub fn fragments(
     options: &RenderOptions,
     sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
 ) -> Result<u64, Error> {
-    let frame = Frame::new(cloud, camera, options)?;
+    let frame = Frame::new(cloud, camera, options, set_up)?;
     let splats = frame.set_up.splats.iter().enumerate();
     Ok(splats
         .map(|(rank, splat)| {
@@ -105,16 +106,30 @@ pub fn fragments(
         .sum())
 }
 
-/// Everything that is ready before the first fragment.
-struct Frame {
-    view: View,
-    set_up: SetUp,
-    set_up_time: Duration,
-    rasterizer: Rasterizer,
+/// Everything that is ready before the first fragment, the same in every core.
+#[derive(Debug)]
+pub struct Frame {
+    /// The camera as set-up sees it.
+    pub view: View,
+    /// The visible splats, in splat order.
+    pub set_up: SetUp,
+    /// What set-up took.
+    pub set_up_time: Duration,
+    /// The samples and the kernel.
+    pub rasterizer: Rasterizer,
 }
 
 impl Frame {
-    fn new(cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<Self, Error> {
+    /// Checks everything, and sets up the splats with `set_up`, which must do as [`set_up`].
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn new(
+        cloud: &Cloud,
+        camera: &Camera,
+        options: &RenderOptions,
+        set_up: impl FnOnce(&Cloud, &View, &RenderOptions) -> SetUp,
+    ) -> Result<Self, Error> {
         camera.check()?;
         options.check()?;
         cloud.check_lengths()?;
@@ -138,7 +153,7 @@ impl Frame {
 
 /// The tiles of a window, each with the ranks of the splats that may leave fragments in it, in splat order. The grid
 /// starts at the frame's corner, whatever the window.
-fn bin(splats: &[VisibleSplat], window: &PixelRect) -> Vec<(PixelRect, Vec<u32>)> {
+pub fn tiles(splats: &[VisibleSplat], window: &PixelRect) -> Vec<(PixelRect, Vec<u32>)> {
     let first = [window.x0.div_euclid(TILE), window.y0.div_euclid(TILE)];
     let columns = (window.x1 - 1).div_euclid(TILE) - first[0] + 1;
     let rows = (window.y1 - 1).div_euclid(TILE) - first[1] + 1;
@@ -238,7 +253,7 @@ fn local_sample(region: &PixelRect, place: SamplePlace, samples: usize, first_sa
 }
 
 /// The four quarters of a region of more than one pixel; the empty ones left out.
-fn quarters(region: &PixelRect) -> impl Iterator<Item = PixelRect> {
+pub fn quarters(region: &PixelRect) -> impl Iterator<Item = PixelRect> {
     let PixelRect { x0, y0, x1, y1 } = *region;
     let [x, y] = [x0 + (x1 - x0 + 1) / 2, y0 + (y1 - y0 + 1) / 2];
     [

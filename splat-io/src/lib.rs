@@ -4,6 +4,8 @@
 //! has before anything is allocated, and whatever is wrong becomes an [`Error`] that says where it is, what
 //! was found and what was expected. An output file is absent, old, or complete ([`AtomicFile`]).
 
+#![forbid(unsafe_code)]
+
 pub mod atomic;
 pub mod camera_json;
 pub mod error;

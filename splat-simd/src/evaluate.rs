@@ -1,7 +1,7 @@
 //! The sample evaluation of SPEC section 4 over lanes: line by line that of [`splat_core::evaluate`], which says what
 //! each quantity means. Where that returns early, this computes on and masks.
 
-use crate::Lanes;
+use crate::lanes::Lanes;
 use splat_core::evaluate::{LensPoint, Limits, SplatConstants};
 
 /// A splat's constants, each in every lane.

@@ -2,11 +2,15 @@
 //!
 //! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
+//! - [`core_scenes`]: scenes of `splat-core`, and the same for the brute-force truth;
+//! - [`errata_scenes`]: scenes that show the errata, and the corrected closed forms;
 //! - [`random`]: deterministic random numbers for scenes;
 //! - [`scenes`]: small scenes made in code;
 //! - [`tolerances`]: every tolerance with its derivation.
 
 pub mod brute_force;
+pub mod core_scenes;
+pub mod errata_scenes;
 pub mod listing;
 pub mod random;
 pub mod scenes;

@@ -258,3 +258,85 @@ pub const SHIFTED_PIXELS: f64 = 1e-3;
 /// Share of the interior pixels of a closed surface that may be less than .99 opaque at 16 samples. Not derived: it is
 /// what the project promises for surfels made from meshes, a quarter of what its first issue allows.
 pub const INTERIOR_HOLES: f64 = 0.00025;
+
+// ---------------------------------------------------------------------------------------------------------
+// Set-up and evaluation of `splat-core`
+
+/// Roundings, in eps of f32, of g = 1 + h.e or of 1 - h.q relative to 1 + |h0 e0| + |h1 e1|, offsets by their
+/// largest jitter: two of the constants, two of the products and of the sum, one of the final sum, two of the
+/// offset and two of p/focus: nine; below twice that.
+pub const SIDE_ROUNDINGS: f64 = 16.0;
+
+/// Samples farther from the frame than this, in pixels, are not aimed at: no picture has them.
+pub const FAR_FROM_THE_FRAME: f64 = 1e5;
+
+/// The a-priori bound of an ordinary splat, in sigma: notes 3.5 say 3.7e-6 with offsets known to 1.5 eps
+/// near the centre (a jitter of 1 pixel); with the widest filter's jitter of 2 pixels, and its roundings
+/// counted one by one, they are known to 6 eps.
+pub const ORDINARY_BOUND: f64 = 3.7e-6 * 4.0;
+
+/// (u, v) in f64, by set-up and evaluation, against the intersection of ray and plane: what eight roundings
+/// of every number that enters do to it, set-up having some eight in a row (screen point, Jacobian,
+/// determinant, rotation, quotient, sum, product with the offset, quotient by g). Measured: 1.1.
+pub const EXACT_ROUNDINGS: f64 = 8.0;
+
+/// The same for an ordinary splat, absolute, in sigma (and the relative depth): a pixel's numbers add up to
+/// less than 1000 sigma, times 1 + r < 3, times eps, times three of the eight roundings, since not all of
+/// them happen at once. Measured: 4.1e-13.
+pub const EXACT_ORDINARY: f64 = 1e-12;
+
+/// A culled splat may still be hit by a sample within the rounding of f32 of its rim or of the near plane,
+/// 6e-8 of them; a hundred times that must not be culled.
+pub const INSIDE_BY: f64 = 1e-5;
+
+/// The error of (u, v), in sigma, up to which f32 can tell where a splat is hit: beyond it set-up drops a
+/// pinhole's splat as edge-on.
+pub const CERTAIN: f64 = 0.25;
+
+/// The share of certain hits of a steep splat that a lens may lose next to the splat's plane: g must exceed
+/// 8 times the largest error of the numerators, where a single hit's error is some tenth of that; the strip
+/// is then at most that part of the lens. Measured: 3.8 % (a splat of 2 pixels, 89.5 degrees, blurred by 5
+/// pixels), 47 % with a threshold that asks for 64 times a coarse error.
+pub const LENS_STRIP: f64 = 0.05;
+
+/// The extent of a clipped disc on the screen, relative to the numbers of which its points are made (size /
+/// least depth * (1 + screen), and 1/sqrt of a short chord's share of the depth): some twenty roundings in
+/// a row, the discriminant's doubled, for the closed form, and as many for the sampled truth. Measured: 7.7
+/// eps.
+pub const EXTENT: f64 = 64.0 * EPS;
+
+/// The centre of a splat against its extent, where centre and axes differ by up to 1e3 in length, so that
+/// sums of their squares hide up to 1e6 of each other's digits: 1e6 eps, and some 1000 roundings of chance.
+pub const OF_A_SIZE: f64 = 1e9 * EPS;
+
+/// The greatest value of a plane of the world over a splat, in units of distance: a pose of up to 5 units
+/// and a scale of 2, some thirty roundings of numbers below 30.
+pub const PLANE: f64 = 1000.0 * EPS;
+
+/// A share of the lens by 100 x 100 points, relative to its radius: a segment of the disc that is .03 R
+/// high is wider than .2 R in its middle, and the points are .02 R apart, so that it holds one.
+pub const LENS_GRID: f64 = 0.03;
+
+/// A splat under a pose of any matrix with a determinant above .1, within 3 units: its inverse has entries
+/// below 20, and three products in a row have some ten roundings each. Measured: 1e-14.
+pub const POSE: f64 = 600.0 * EPS;
+
+/// A depth interval is rounded to f32 once: 2^-24, and what f64 adds. Measured: 5.92e-8.
+pub const INTERVAL: f64 = 5.97e-8;
+
+/// A fragment's depth, relative, against the truth: three roundings (2e-7) for most splats (notes 3.2),
+/// some twenty for the steep ones of these scenes whose g is the difference of larger numbers. Measured:
+/// 4.1e-7.
+pub const DEPTH_F32: f64 = 1.2e-6;
+
+/// Extreme pixel centres of a blurred point, in pixels: half a pixel, a pixel's splat, and the rim of a
+/// disc whose outermost two pixels 64 samples may miss.
+pub const BOKEH: f64 = 3.0;
+
+/// How much less than the exact kernel a weight of the floor table may be: r2 in f32 is off by some ten
+/// roundings, which can carry it into the next bin, and half of that is the exponential's change; the entry
+/// is rounded, too.
+pub const WEIGHT_F32: f64 = 6e-7;
+
+/// Linear interpolation in 256 bins at F = 2, relative: 1.9e-6 (notes, E18), and 2.5 roundings of f32.
+pub const LERP_F2: f64 = 2.1e-6;

@@ -106,6 +106,23 @@ impl SampleTable {
         self.lens.as_ref().map_or(&[], |lens| pattern(&lens.points, &lens.selection, self.samples, x, y))
     }
 
+    /// The numbers of the patterns, below [`PATTERNS`], from which a pixel takes its positions and its lens points.
+    #[inline]
+    pub fn patterns_of(&self, x: i32, y: i32) -> [usize; 2] {
+        let filter = pattern_number(&self.filter_selection, x, y);
+        [filter, self.lens.as_ref().map_or(0, |lens| pattern_number(&lens.selection, x, y))]
+    }
+
+    /// The positions of a pattern's samples.
+    pub fn jitter_of_pattern(&self, pattern: usize) -> &[[f32; 2]] {
+        &self.jitter[pattern * self.samples..][..self.samples]
+    }
+
+    /// The lens points of a pattern's samples; empty for a pinhole.
+    pub fn lens_of_pattern(&self, pattern: usize) -> &[LensPoint<f32>] {
+        self.lens.as_ref().map_or(&[], |lens| &lens.points[pattern * self.samples..][..self.samples])
+    }
+
     /// The lens points of a pixel's samples on an aperture of radius 1; empty for a pinhole.
     pub fn unit_lens(&self, x: i32, y: i32) -> &[[f32; 2]] {
         self.lens.as_ref().map_or(&[], |lens| pattern(&lens.unit, &lens.selection, self.samples, x, y))
@@ -114,10 +131,15 @@ impl SampleTable {
 
 /// The slice of a pixel's pattern.
 fn pattern<'a, T>(points: &'a [T], selection: &Selection, samples: usize, x: i32, y: i32) -> &'a [T] {
+    let first = pattern_number(selection, x, y) * samples;
+    &points[first..first + samples]
+}
+
+/// The number of a pixel's pattern.
+fn pattern_number(selection: &Selection, x: i32, y: i32) -> usize {
     let column = x as usize % SELECTION_SIZE;
     let row = y as usize % SELECTION_SIZE;
-    let first = usize::from(selection[row * SELECTION_SIZE + column]) * samples;
-    &points[first..first + samples]
+    usize::from(selection[row * SELECTION_SIZE + column])
 }
 
 impl LensSamples {

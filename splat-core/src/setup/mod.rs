@@ -21,6 +21,7 @@ use glam::{DVec3, Vec3, Vec3Swizzles};
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Colours and weights beyond this are clamped to it, so that no sum of a layer overflows `f32`.
 const MAX_MAGNITUDE: f32 = 1e9;
@@ -78,13 +79,27 @@ pub struct SetUp {
     pub dropped: BTreeMap<&'static str, usize>,
 }
 
+impl SetUp {
+    /// What the fragments of each splat share, by rank.
+    pub fn surfaces(&self) -> Vec<SplatSurface> {
+        self.splats.iter().map(|splat| splat.surface).collect()
+    }
+}
+
 /// The cause of dropping a splat whose projection has no area that `f32` could tell.
 const EDGE_ON: &str = "edge_on";
 
 /// Sets up every splat of a cloud whose normals are known.
 pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
+    let mut result = set_up_range(cloud, view, options, 0..cloud.len());
+    result.splats.sort_unstable_by(|a, b| splat_order(cloud, a, b));
+    result
+}
+
+/// Sets up a part of the splats of a cloud, in the order of the cloud.
+pub fn set_up_range(cloud: &Cloud, view: &View, options: &RenderOptions, range: Range<usize>) -> SetUp {
     let mut result = SetUp::default();
-    for index in 0..cloud.len() {
+    for index in range {
         if let Some(defect) = cloud.defect(index) {
             *result.dropped.entry(defect.name()).or_default() += 1;
             continue;
@@ -95,7 +110,6 @@ pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
             Outcome::Culled => {}
         }
     }
-    result.splats.sort_unstable_by(|a, b| splat_order(cloud, a, b));
     result
 }
 
@@ -133,6 +147,9 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
     if margin.radius > usual {
         let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::EdgeOn };
         bounds = candidates(&splat, &screen, margin.radius, view);
+    }
+    if bounds.is_empty() {
+        return Outcome::Culled;
     }
     let constants = SplatConstants { edge_on: margin.edge_on, ..exact }.to_f32();
     if !constants.is_finite() {
@@ -305,7 +322,7 @@ fn depth_interval(splat: &CameraSplat, view: &View, options: &RenderOptions) -> 
 }
 
 /// Splat order: by nearest depth, then by the splat's own data, so that the order in the file changes nothing.
-fn splat_order(cloud: &Cloud, a: &VisibleSplat, b: &VisibleSplat) -> Ordering {
+pub fn splat_order(cloud: &Cloud, a: &VisibleSplat, b: &VisibleSplat) -> Ordering {
     a.nearest.total_cmp(&b.nearest).then_with(|| {
         let (a, b) = (a.index as usize, b.index as usize);
         compare(cloud.positions[a], cloud.positions[b])

@@ -1,0 +1,146 @@
+//! Lanes in 256-bit registers of x86-64. The only module with unsafe code: the intrinsics.
+//!
+//! Soundness: a value of type [`Avx2`] is only ever made by code under [`run`], which asks the processor first; so
+//! whoever holds one may use the instructions. The methods are `#[inline(always)]`, so that they become instructions of the
+//! `target_feature` function that they are inlined into, never calls.
+
+#![expect(unsafe_code, reason = "intrinsics; see the module's documentation")]
+
+use super::{Kernel, LANES, Lanes};
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+/// Eight lanes.
+#[derive(Clone, Copy)]
+pub struct Avx2(__m256);
+
+/// Runs a kernel on these lanes, or on portable ones if the processor does not have the instructions.
+pub fn run<K: Kernel>(kernel: K) -> K::Output {
+    #[target_feature(enable = "avx2")]
+    fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx2>()
+    }
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { with_avx2(kernel) }
+    } else {
+        kernel.run::<wide::f32x8>()
+    }
+}
+
+/// Implements an operator by an intrinsic.
+macro_rules! operator {
+    ($trait:ident, $method:ident, $intrinsic:ident) => {
+        impl $trait for Avx2 {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: see the module's documentation.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+
+operator!(Add, add, _mm256_add_ps);
+operator!(Sub, sub, _mm256_sub_ps);
+operator!(Mul, mul, _mm256_mul_ps);
+operator!(Div, div, _mm256_div_ps);
+operator!(BitAnd, bitand, _mm256_and_ps);
+operator!(BitOr, bitor, _mm256_or_ps);
+
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    fn load(values: &[f32; LANES]) -> Self {
+        // SAFETY: see the module's documentation; the array is as long as the register.
+        Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f32; LANES] {
+        let mut values = [0.0; LANES];
+        // SAFETY: see the module's documentation; the array is as long as the register.
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+
+    #[inline(always)]
+    fn mask(bits: u32) -> Self {
+        // SAFETY: see the module's documentation.
+        unsafe {
+            let place = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), place);
+            Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, place)))
+        }
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn least(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn greatest(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn select(self, yes: Self, no: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn and_not(self, mask: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_andnot_ps(mask.0, self.0) })
+    }
+
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        // SAFETY: see the module's documentation.
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+
+    #[inline(always)]
+    fn truncate(self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(self.0) })
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &[f32; LANES]) -> Self {
+        // SAFETY: see the module's documentation; the permutation reads three bits of each index.
+        unsafe {
+            let entries = _mm256_loadu_ps(table.as_ptr());
+            Self(_mm256_permutevar8x32_ps(entries, _mm256_cvttps_epi32(self.0)))
+        }
+    }
+}
