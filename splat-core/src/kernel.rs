@@ -94,10 +94,11 @@ impl Quartic {
     #[inline(always)]
     fn weight(&self, r2: f32) -> f32 {
         let position = r2 * self.scale;
-        let bin = (position as usize).min(QUARTIC_BINS - 1);
+        // By way of i32, whose conversion is the cheapest.
+        let bin = (position as i32).min(QUARTIC_BINS as i32 - 1) as usize;
         let t = position - bin as f32;
-        let [c0, c1, c2, c3, c4] = self.coefficients;
-        (((c4[bin] * t + c3[bin]) * t + c2[bin]) * t + c1[bin]) * t + c0[bin]
+        let c = &self.coefficients;
+        (((c[4][bin] * t + c[3][bin]) * t + c[2][bin]) * t + c[1][bin]) * t + c[0][bin]
     }
 }
 
@@ -149,7 +150,7 @@ impl KernelTable {
             return self.quartic.weight(r2);
         }
         let position = r2 * self.scale;
-        let bin = (position as usize).min(TABLE_BINS - 1);
+        let bin = (position as i32).min(TABLE_BINS as i32 - 1) as usize;
         let [start, step] = self.bins[bin];
         if self.mode == TableMode::Lerp256 { start + (position - bin as f32) * step } else { start }
     }
