@@ -52,10 +52,10 @@ struct Picture<'a> {
     level: Level,
 }
 
-/// Renders a cloud with a renderer made for it: as [`splat_core::render`], on all processors.
+/// Renders a cloud with a renderer made for it: as [`splat_core::render()`], on all processors.
 ///
 /// # Errors
-/// As [`splat_core::render`].
+/// As [`splat_core::render()`].
 pub fn render(
     cloud: &Cloud,
     camera: &Camera,
@@ -86,11 +86,11 @@ impl Renderer {
         self.level
     }
 
-    /// Renders a cloud: the same bits as [`splat_core::render`], whatever the threads and the level. `progress` is told
+    /// Renders a cloud: the same bits as [`splat_core::render()`], whatever the threads and the level. `progress` is told
     /// the finished part of the picture, from 0 to 1, now and then.
     ///
     /// # Errors
-    /// As [`splat_core::render`].
+    /// As [`splat_core::render()`].
     pub fn render(
         &mut self,
         cloud: &Cloud,
@@ -294,7 +294,7 @@ fn few(aovs: AovSelection) -> bool {
     !(depth || normal || albedo || position || id || layers)
 }
 
-/// Gives every fragment of a picture to `sink`, as [`splat_core::fragments`] does: splat by splat in splat order, each
+/// Gives every fragment of a picture to `sink`, as [`splat_core::fragments()`] does: splat by splat in splat order, each
 /// splat's by pixel, row by row, and sample. Returns the number of samples tested.
 ///
 /// # Errors
