@@ -174,19 +174,7 @@ pub fn aovs(text: &str) -> Result<AovSelection, String> {
             "layers" => aovs.layers = true,
             "samples" => aovs.samples = true,
             "variance" => aovs.variance = true,
-            "all" => {
-                aovs = AovSelection {
-                    depth: true,
-                    normal: true,
-                    albedo: true,
-                    position: true,
-                    id: true,
-                    coverage: true,
-                    layers: true,
-                    samples: true,
-                    variance: true,
-                }
-            }
+            "all" => aovs = AovSelection::ALL,
             _ => {
                 return Err(format!(
                     "{name:?} is not one of depth, normal, albedo, position, id, coverage, layers, samples, \

@@ -77,6 +77,21 @@ pub struct AovSelection {
     pub variance: bool,
 }
 
+impl AovSelection {
+    /// All of them.
+    pub const ALL: Self = Self {
+        depth: true,
+        normal: true,
+        albedo: true,
+        position: true,
+        id: true,
+        coverage: true,
+        layers: true,
+        samples: true,
+        variance: true,
+    };
+}
+
 /// [`Film::id`] of a pixel in which no sample hits anything.
 pub const NO_ID: u32 = u32::MAX;
 

@@ -134,17 +134,7 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let opaque = Resolve::Surface { coverage: Coverage::Opaque, thickness: Thickness::AroundHit };
     let soft =
         Resolve::Surface { coverage: Coverage::Soft { saturation: 1.0 }, thickness: Thickness::WholeSplat };
-    let aovs = AovSelection {
-        depth: true,
-        normal: true,
-        albedo: true,
-        position: true,
-        id: true,
-        coverage: true,
-        layers: true,
-        samples: true,
-        variance: true,
-    };
+    let aovs = AovSelection::ALL;
     (
         select(vec![opaque, soft, Resolve::Over]),
         select(vec![Kernel::Gaussian, Kernel::Windowed, Kernel::Disc]),

@@ -4,18 +4,6 @@ use glam::{DVec3, DVec4};
 use splat_core::{AovSelection, PixelRect};
 use std::fs;
 
-const ALL: AovSelection = AovSelection {
-    depth: true,
-    normal: true,
-    albedo: true,
-    position: true,
-    id: true,
-    coverage: true,
-    layers: true,
-    samples: true,
-    variance: true,
-};
-
 /// A film whose every value says where it belongs.
 fn film(window: PixelRect, aovs: AovSelection) -> Film {
     let mut film = Film::new([64, 48], window, aovs);
@@ -66,7 +54,7 @@ fn samples<'a>(image: &'a ReadBack, name: &str) -> &'a FlatSamples {
 
 #[test]
 fn every_channel_comes_back_under_every_compression() {
-    let film = film(PixelRect::new(5, -3, 38, 30), ALL);
+    let film = film(PixelRect::new(5, -3, 38, 30), AovSelection::ALL);
     let planes = [
         ("R", 0),
         ("G", 1),
@@ -146,7 +134,7 @@ fn metadata_come_back() {
         options: Some("--exp lerp256 ü".to_owned()),
         input_hash: Some("00ff".to_owned()),
     };
-    let mut film = film(PixelRect::new(0, 0, 2, 2), ALL);
+    let mut film = film(PixelRect::new(0, 0, 2, 2), AovSelection::ALL);
     film.position_origin = DVec3::new(500_000.25, 0.0, -1.0);
     let image = read_back(&write(&film, &metadata, &ExrOptions::default()));
     let attributes = &image.layer_data.attributes;
@@ -173,7 +161,7 @@ fn metadata_come_back() {
 fn the_same_picture_is_the_same_file_with_sorted_attributes() {
     let metadata =
         Metadata { seed: Some(1), samples: Some(2), engine: Some("x".into()), ..Metadata::default() };
-    let film = film(PixelRect::new(0, 0, 64, 48), ALL);
+    let film = film(PixelRect::new(0, 0, 64, 48), AovSelection::ALL);
     let files: Vec<_> = [true, false, true]
         .map(|parallel| write(&film, &metadata, &ExrOptions { parallel, ..ExrOptions::default() }))
         .to_vec();
@@ -185,12 +173,12 @@ fn the_same_picture_is_the_same_file_with_sorted_attributes() {
 
 #[test]
 fn an_empty_or_damaged_film_is_refused() {
-    let empty = film(PixelRect::new(3, 3, 3, 9), ALL);
+    let empty = film(PixelRect::new(3, 3, 3, 9), AovSelection::ALL);
     let path = Path::new("never-written.exr");
     let message =
         write_exr(path, &empty, &Metadata::default(), &ExrOptions::default()).unwrap_err().to_string();
     assert!(message.contains("no pixel"), "{message}");
-    let mut short = film(PixelRect::new(0, 0, 3, 3), ALL);
+    let mut short = film(PixelRect::new(0, 0, 3, 3), AovSelection::ALL);
     short.depth.as_mut().unwrap().pop();
     assert!(write_exr(path, &short, &Metadata::default(), &ExrOptions::default()).is_err());
     assert!(!path.exists());
