@@ -1,5 +1,6 @@
 //! The test oracle: what every renderer of this workspace is judged against.
 //!
+//! - [`analytic`]: what the analytic tests measure pictures by;
 //! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
 //! - [`core_scenes`]: scenes of `splat-core`, and the same for the brute-force truth;
@@ -8,6 +9,7 @@
 //! - [`scenes`]: small scenes made in code;
 //! - [`tolerances`]: every tolerance with its derivation.
 
+pub mod analytic;
 pub mod brute_force;
 pub mod core_scenes;
 pub mod errata_scenes;
