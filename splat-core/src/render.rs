@@ -67,13 +67,7 @@ pub fn render(
         pixels: PixelResolver::new(cloud, camera, options, &frame.view, &frame.set_up.splats, &surfaces),
         buffer: TileBuffer::default(),
         budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
-        statistics: Statistics {
-            dropped: frame.set_up.dropped.clone(),
-            drawn: frame.set_up.splats.len(),
-            setup: frame.set_up_time,
-            bin: start.elapsed(),
-            ..Statistics::default()
-        },
+        statistics: frame.statistics(start.elapsed()),
     };
     picture.film.position_origin = cloud.origin;
     let count = tiles.len();
@@ -120,6 +114,17 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// What set-up took, and `bin`, the time of sorting splats into tiles.
+    pub fn statistics(&self, bin: Duration) -> Statistics {
+        Statistics {
+            dropped: self.set_up.dropped.clone(),
+            drawn: self.set_up.splats.len(),
+            setup: self.set_up_time,
+            bin,
+            ..Statistics::default()
+        }
+    }
+
     /// Checks everything, and sets up the splats with `set_up`, which must do as [`set_up`].
     ///
     /// # Errors

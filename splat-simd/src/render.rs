@@ -102,13 +102,7 @@ impl Renderer {
         let window = frame.view.window;
         let start = Instant::now();
         let tiles = tiles(&frame.set_up.splats, &window);
-        let mut statistics = Statistics {
-            dropped: frame.set_up.dropped.clone(),
-            drawn: frame.set_up.splats.len(),
-            setup: frame.set_up_time,
-            bin: start.elapsed(),
-            ..Statistics::default()
-        };
+        let mut statistics = frame.statistics(start.elapsed());
         let picture = Picture {
             cloud,
             camera,
@@ -120,9 +114,9 @@ impl Renderer {
         };
         let mut film = Film::new([camera.width, camera.height], window, options.aovs);
         film.position_origin = cloud.origin;
-        let batch = TILES_A_REPORT * self.threads();
+        let (count, batch) = (tiles.len(), TILES_A_REPORT * self.threads());
         for (number, tiles) in tiles.chunks(batch).enumerate() {
-            progress((number * batch) as f64 / (window.area() / 1024).max(1) as f64);
+            progress((number * batch) as f64 / count as f64);
             let finished: Vec<Tile> = self.threads.install(|| {
                 tiles
                     .par_iter()

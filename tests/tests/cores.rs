@@ -49,7 +49,13 @@ fn check_pictures(cloud: &Cloud, camera: &Camera, options: &RenderOptions, threa
             let mut renderer = Renderer::new(threads, level).unwrap();
             // Twice, since buffers are kept.
             for _ in 0..2 {
-                let fast = renderer.render(cloud, camera, options, &mut |_| {}).unwrap();
+                let mut told = 0.0;
+                let mut progress = |done: f64| {
+                    assert!((told..=1.0).contains(&done), "progress {done} after {told}");
+                    told = done;
+                };
+                let fast = renderer.render(cloud, camera, options, &mut progress).unwrap();
+                assert_eq!(told, 1.0);
                 assert_eq!(bits(&reference.film.rgba), bits(&fast.film.rgba), "{} {threads}", level.name());
                 assert_eq!(reference.film, fast.film, "{} {threads}", level.name());
                 assert_eq!(reference.statistics.fragments, fast.statistics.fragments);
