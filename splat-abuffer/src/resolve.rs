@@ -80,6 +80,11 @@ pub struct SampleColor {
     pub uncovered: f32,
 }
 
+impl SampleColor {
+    /// That of a sample that hits nothing.
+    pub const NOTHING: Self = Self { color: [0.0; 3], transmittance: 1.0, uncovered: 1.0 };
+}
+
 /// A surface (or, for `over`, a fragment) that takes part in a sample's colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Layer {
@@ -243,7 +248,7 @@ impl Resolver {
 
     /// Lays the sorted layers over each other, front to back. `cover` gives a layer's coverage and opacity.
     fn composite(&mut self, cover: impl Fn(&Layer) -> (f32, f32)) -> SampleColor {
-        let mut sample = SampleColor { color: [0.0; 3], transmittance: 1.0, uncovered: 1.0 };
+        let mut sample = SampleColor::NOTHING;
         self.visible = None;
         for (index, layer) in self.layers.iter().enumerate() {
             let (coverage, opacity) = cover(layer);

@@ -152,6 +152,14 @@ impl Film {
         }
     }
 
+    /// Gives every pixel what the first one holds in the channels where a pixel without fragments is not as a new one.
+    pub(crate) fn repeat_first_pixel(&mut self) {
+        fill_with_first(&mut self.rgba);
+        if let Some(samples) = &mut self.samples {
+            fill_with_first(samples);
+        }
+    }
+
     /// Copies another film, whose window lies within this one's and which holds the same channels.
     pub fn paste(&mut self, part: &Self) {
         let target = (self.window, part.window);
@@ -180,6 +188,12 @@ impl Film {
     /// Index of the frame's pixel (x, y) in the arrays; it must lie in the window.
     pub fn index(&self, x: i32, y: i32) -> usize {
         (y - self.window.y0) as usize * self.width() + (x - self.window.x0) as usize
+    }
+}
+
+fn fill_with_first<T: Copy>(values: &mut [T]) {
+    if let [first, rest @ ..] = values {
+        rest.fill(*first);
     }
 }
 

@@ -4,7 +4,7 @@ use crate::film::NO_ID;
 use crate::raster::SamplePlace;
 use crate::sampling::SampleTable;
 use crate::setup::{View, VisibleSplat, base_color};
-use crate::{AovSelection, Camera, Cloud, Film, RenderOptions, Shading, srgb};
+use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading, srgb};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
 
@@ -28,7 +28,7 @@ pub struct PixelResolver<'a> {
 }
 
 /// What is summed over the samples of a pixel.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     samples: u32,
     color: [f64; 3],
@@ -77,25 +77,47 @@ impl<'a> PixelResolver<'a> {
     /// Adds the next sample, given its fragments.
     pub fn add(&mut self, place: SamplePlace, fragments: &mut [Fragment], samples: &SampleTable) {
         let sample = if fragments.is_empty() {
-            SampleColor { color: [0.0; 3], transmittance: 1.0, uncovered: 1.0 }
+            SampleColor::NOTHING
         } else {
             self.resolver.resolve(fragments, self.surfaces)
         };
-        self.add_color(&sample);
+        self.add_colors(std::iter::once(sample));
         if !fragments.is_empty() {
             self.add_aovs(place, fragments, samples);
         }
     }
 
-    /// Adds the next sample, already resolved; enough where no AOV is wanted but variance, coverage and samples.
-    pub fn add_color(&mut self, sample: &SampleColor) {
-        self.sums.samples += 1;
-        for (channel, value) in sample.color.map(f64::from).into_iter().enumerate() {
-            self.sums.color[channel] += value;
-            self.sums.color_squared[channel] += value * value;
+    /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.
+    #[inline(always)]
+    pub fn add_colors(&mut self, samples: impl Iterator<Item = SampleColor>) {
+        let mut sums = self.sums;
+        for sample in samples {
+            sums.samples += 1;
+            let color = sample.color.map(f64::from);
+            for (sum, value) in sums.color.iter_mut().zip(color) {
+                *sum += value;
+            }
+            sums.transmittance += f64::from(sample.transmittance);
+            if self.aovs.variance {
+                for (sum, value) in sums.color_squared.iter_mut().zip(color) {
+                    *sum += value * value;
+                }
+            }
+            if self.aovs.coverage {
+                sums.uncovered += f64::from(sample.uncovered);
+            }
         }
-        self.sums.transmittance += f64::from(sample.transmittance);
-        self.sums.uncovered += f64::from(sample.uncovered);
+        self.sums = sums;
+    }
+
+    /// A film of which every pixel is as one without fragments, with this many samples each.
+    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Film {
+        let mut film = Film::new(frame, window, self.aovs);
+        self.start();
+        self.add_colors((0..samples).map(|_| SampleColor::NOTHING));
+        self.finish(window.x0, window.y0, &mut film);
+        film.repeat_first_pixel();
+        film
     }
 
     /// Adds to the sums what only the AOVs need.

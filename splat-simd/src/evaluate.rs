@@ -38,18 +38,25 @@ pub struct LaneLensPoint<L> {
 /// Hits of several samples: lanes without a hit hold arbitrary values.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneHits<L> {
-    /// Bit i is set where lane i is hit.
-    pub mask: u32,
-    /// Bit i is set where lane i's lens point is on the other side of the splat's plane than the eye.
-    pub flipped: u32,
+    /// Set where the lane is hit.
+    pub mask: L,
+    /// Set where the lane's lens point is on the other side of the splat's plane than the eye.
+    pub flipped: L,
     /// u^2 + v^2.
     pub r2: L,
     /// View depth w, in camera units.
     pub depth: L,
 }
 
+/// Two values, each in every lane. (Not `map`: a closure that is not inlined loses the instruction set.)
+#[inline(always)]
+fn pair<L: Lanes>([first, second]: [f32; 2]) -> [L; 2] {
+    [L::splat(first), L::splat(second)]
+}
+
 impl<L: Lanes> LaneLimits<L> {
     /// The limits in every lane.
+    #[inline(always)]
     pub fn new(limits: &Limits<f32>) -> Self {
         Self { cutoff: L::splat(limits.cutoff), near: L::splat(limits.near), far: L::splat(limits.far) }
     }
@@ -58,52 +65,59 @@ impl<L: Lanes> LaneLimits<L> {
 impl<L: Lanes> LaneLensPoint<L> {
     /// The same point in every lane.
     pub fn splat(point: &LensPoint<f32>) -> Self {
-        Self { p: point.p.map(L::splat), p_over_focus: point.p_over_focus.map(L::splat) }
+        Self { p: pair(point.p), p_over_focus: pair(point.p_over_focus) }
     }
 }
 
 impl<L: Lanes> LaneSplat<L> {
     /// The constants in every lane.
+    #[inline(always)]
     pub fn new(constants: &SplatConstants<f32>) -> Self {
         Self {
-            h: constants.h.map(L::splat),
+            h: pair(constants.h),
             a1: L::splat(constants.a1),
-            b: constants.b.map(L::splat),
-            reference: constants.reference.map(L::splat),
+            b: pair(constants.b),
+            reference: pair(constants.reference),
             centred: constants.centred,
             depth: L::splat(constants.depth),
             inverse_depth: L::splat(constants.inverse_depth),
-            depth_slope: constants.depth_slope.map(L::splat),
+            depth_slope: pair(constants.depth_slope),
             edge_on: L::splat(constants.edge_on),
         }
     }
 
-    /// [`SplatConstants::pinhole`] for a sample a lane.
+    /// [`SplatConstants::pinhole`] for a sample a lane. `PLAIN` is that of the splat, here and below:
+    /// what it excludes is not tested.
     #[inline(always)]
-    pub fn pinhole(&self, d: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
+    pub fn pinhole<const PLAIN: bool>(&self, d: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
         let g = L::splat(1.0) + (self.h[0] * d[0] + self.h[1] * d[1]);
-        let inside = g.greater(L::splat(0.0));
+        let inside = if PLAIN { None } else { Some(g.greater(L::splat(0.0))) };
         let nu = self.a1 * d[1];
         let nv = self.b[0] * d[0] + self.b[1] * d[1];
-        self.hits(inside, nu, nv, g, self.depth, 0, limits)
+        self.hits::<PLAIN>(inside, nu, nv, g, self.depth, L::splat(0.0), limits)
     }
 
     /// [`SplatConstants::thin_lens`] for a sample a lane.
     #[inline(always)]
-    pub fn thin_lens(&self, d: [L; 2], lens: &LaneLensPoint<L>, limits: &LaneLimits<L>) -> LaneHits<L> {
+    pub fn thin_lens<const PLAIN: bool>(
+        &self,
+        d: [L; 2],
+        lens: &LaneLensPoint<L>,
+        limits: &LaneLimits<L>,
+    ) -> LaneHits<L> {
         let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
         let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
         let he = self.h[0] * e[0] + self.h[1] * e[1];
         let hq = self.h[0] * q[0] + self.h[1] * q[1];
         let g = L::splat(1.0) + he;
         let side = L::splat(1.0) - hq;
-        let inside = (g * side).greater(self.edge_on);
+        let inside = Some((g * side).greater(self.edge_on));
         let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
         let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
         let nu = self.a1 * m1;
         let nv = self.b[0] * m0 + self.b[1] * m1;
-        let flipped = side.less(L::splat(0.0)).bits();
-        self.hits(inside, nu, nv, g, self.depth * side, flipped, limits)
+        let flipped = side.less(L::splat(0.0));
+        self.hits::<PLAIN>(inside, nu, nv, g, self.depth * side, flipped, limits)
     }
 
     /// [`SplatConstants::orthographic`] for a sample a lane.
@@ -114,34 +128,41 @@ impl<L: Lanes> LaneSplat<L> {
         let r2 = u * u + v * v;
         let depth = self.depth + (self.depth_slope[0] * u + self.depth_slope[1] * v);
         let inside = r2.less(limits.cutoff) & depth.greater(limits.near) & depth.less(limits.far);
-        LaneHits { mask: inside.bits(), flipped: 0, r2, depth }
+        LaneHits { mask: inside, flipped: L::splat(0.0), r2, depth }
     }
 
     /// The common end of the perspective forms.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the seven quantities of one formula, inlined twice")]
-    fn hits(
+    fn hits<const PLAIN: bool>(
         &self,
-        inside: L,
+        inside: Option<L>,
         nu: L,
         nv: L,
         g: L,
         scaled_depth: L,
-        flipped: u32,
+        flipped: L,
         limits: &LaneLimits<L>,
     ) -> LaneHits<L> {
         let inverse_g = L::splat(1.0) / g;
-        let u = self.reference[0] + nu * inverse_g;
-        let v = self.reference[1] + nv * inverse_g;
+        let [mut u, mut v] = [nu * inverse_g, nv * inverse_g];
+        if !PLAIN {
+            // Else it is 0, which changes no square.
+            [u, v] = [self.reference[0] + u, self.reference[1] + v];
+        }
         let r2 = u * u + v * v;
         let depth = scaled_depth * inverse_g;
-        let on_splat = if self.centred {
+        let mut mask = if PLAIN {
             (nu * nu + nv * nv).less(limits.cutoff * (g * g))
         } else {
-            r2.less(limits.cutoff)
+            let centred = (nu * nu + nv * nv).less(limits.cutoff * (g * g));
+            let on_splat = if self.centred { centred } else { r2.less(limits.cutoff) };
+            on_splat & depth.greater(limits.near) & depth.less(limits.far)
         };
-        let inside = inside & on_splat & depth.greater(limits.near) & depth.less(limits.far);
-        LaneHits { mask: inside.bits(), flipped, r2, depth }
+        if let Some(inside) = inside {
+            mask = mask & inside;
+        }
+        LaneHits { mask, flipped, r2, depth }
     }
 }
 
@@ -188,7 +209,7 @@ mod tests {
     fn check(lanes: &LaneHits<f32x8>, scalar: [Option<Hit<f32>>; 8]) -> Result<(), TestCaseError> {
         let (r2, depth) = (lanes.r2.to_array(), lanes.depth.to_array());
         for (lane, hit) in scalar.into_iter().enumerate() {
-            let bit = |mask: u32| mask >> lane & 1 == 1;
+            let bit = |mask: f32x8| mask.bits() >> lane & 1 == 1;
             prop_assert_eq!(bit(lanes.mask), hit.is_some());
             if let Some(hit) = hit {
                 prop_assert_eq!(r2[lane].to_bits(), hit.r2.to_bits());
@@ -216,12 +237,12 @@ mod tests {
             let each = |evaluate: &dyn Fn([f32; 2]) -> Option<Hit<f32>>| -> [Option<Hit<f32>>; 8] {
                 std::array::from_fn(|lane| evaluate([x[lane], y[lane]]))
             };
-            check(&lane_splat.pinhole(d, &lane_limits), each(&|d| splat.pinhole(d, &limits)))?;
+            check(&lane_splat.pinhole::<false>(d, &lane_limits), each(&|d| splat.pinhole(d, &limits)))?;
             check(&lane_splat.orthographic(d, &lane_limits), each(&|d| splat.orthographic(d, &limits)))?;
             let point = LensPoint { p: [lens[0], lens[1]], p_over_focus: [lens[2], lens[3]] };
             let lane_point = LaneLensPoint::splat(&point);
             check(
-                &lane_splat.thin_lens(d, &lane_point, &lane_limits),
+                &lane_splat.thin_lens::<false>(d, &lane_point, &lane_limits),
                 each(&|d| splat.thin_lens(d, &point, &limits)),
             )?;
         }

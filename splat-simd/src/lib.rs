@@ -4,13 +4,16 @@
 //! where the processor has them, chosen once a frame ([`Level`]). What it draws is what [`splat_core::render()`] draws, bit
 //! for bit: same set-up, same evaluation in the same rounding order, same resolve.
 
+mod compare;
 mod evaluate;
 mod lanes;
+mod places;
 mod raster;
+mod records;
 mod render;
 mod resolve;
 mod samples;
 
-pub use evaluate::{LaneHits, LaneLensPoint, LaneLimits, LaneSplat};
-pub use lanes::{Lanes, Level};
-pub use render::{Difference, Renderer, compare, fragments, render};
+pub use compare::{Difference, compare, fragments};
+pub use lanes::Level;
+pub use render::{Renderer, render};

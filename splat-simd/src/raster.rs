@@ -1,111 +1,18 @@
-//! From splats to records: eight samples of a pixel against one splat at a time.
+//! From splats to fragments: the eight samples of a cell against one splat at a time.
 
-use crate::evaluate::{LaneHits, LaneSplat};
-use crate::lanes::{Kernel, LANES, Lanes};
+use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
+use crate::lanes::{Kernel, LANES, Lanes, prefetch};
+use crate::places::PlaceList;
+use crate::records::{Hits, Page, RecordBuffer};
 use crate::samples::{LaneSamples, limits};
-use splat_abuffer::Fragment;
+use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
-use splat_core::kernel::{KernelTable, QUARTIC_BINS};
+use splat_core::kernel::{KernelTable, QUARTIC_BINS, Quartic};
 use splat_core::raster::{Form, Rasterizer};
 use splat_core::setup::VisibleSplat;
 
-/// The fragments of one splat in eight samples of a pixel: where there is none, an infinite depth and no weight.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub struct Record {
-    /// View depths.
-    pub depth: [f32; LANES],
-    /// Weights.
-    pub weight: [f32; LANES],
-}
-
-/// Where a record belongs: a group of samples of a pixel of the region, and the splat.
-#[derive(Debug, Clone, Copy)]
-pub struct RecordKey {
-    /// Pixel of the region times groups, plus group.
-    pub cell: u32,
-    /// Rank of the splat.
-    pub rank: u32,
-    /// Whether its back was hit.
-    pub back: bool,
-}
-
-/// The records of a region, in splat order, and their grouping by cell.
-#[derive(Debug, Default)]
-pub struct RecordBuffer {
-    records: Vec<Record>,
-    keys: Vec<RecordKey>,
-    starts: Vec<u32>,
-    order: Vec<u32>,
-    /// Samples tested.
-    pub tests: u64,
-    /// Fragments stored.
-    pub fragments: u64,
-}
-
-impl RecordBuffer {
-    /// Bytes that a record needs with all that belongs to it.
-    pub const BYTES_PER_RECORD: usize = size_of::<Record>() + size_of::<RecordKey>() + size_of::<u32>();
-
-    /// Empties the buffer.
-    pub fn clear(&mut self) {
-        self.records.clear();
-        self.keys.clear();
-        self.tests = 0;
-        self.fragments = 0;
-    }
-
-    /// Number of records.
-    pub fn len(&self) -> usize {
-        self.records.len()
-    }
-
-    /// Groups the records by cell; within one they stay in splat order (a stable counting sort).
-    pub fn group(&mut self, cells: usize) {
-        self.starts.clear();
-        self.starts.resize(cells + 1, 0);
-        for key in &self.keys {
-            self.starts[key.cell as usize + 1] += 1;
-        }
-        for cell in 0..cells {
-            self.starts[cell + 1] += self.starts[cell];
-        }
-        self.order.clear();
-        self.order.resize(self.keys.len(), 0);
-        for (number, key) in self.keys.iter().enumerate() {
-            let position = &mut self.starts[key.cell as usize];
-            self.order[*position as usize] = number as u32;
-            *position += 1;
-        }
-        self.starts.copy_within(0..cells, 1);
-        self.starts[0] = 0;
-    }
-
-    /// The numbers of a cell's records, in splat order, after [`RecordBuffer::group`].
-    #[inline(always)]
-    pub fn cell(&self, cell: usize) -> &[u32] {
-        &self.order[self.starts[cell] as usize..self.starts[cell + 1] as usize]
-    }
-
-    /// A record and what it belongs to.
-    #[inline(always)]
-    pub fn get(&self, number: u32) -> (&Record, RecordKey) {
-        (&self.records[number as usize], self.keys[number as usize])
-    }
-
-    /// The fragment of a record in a lane, if there is one.
-    pub fn fragment(&self, number: u32, lane: usize) -> Option<Fragment> {
-        let (record, key) = self.get(number);
-        (record.weight[lane] > 0.0)
-            .then(|| Fragment::new(record.depth[lane], record.weight[lane], key.rank, key.back))
-    }
-
-    fn push(&mut self, key: RecordKey, record: Record, fragments: u32) {
-        self.keys.push(key);
-        self.records.push(record);
-        self.fragments += u64::from(fragments);
-    }
-}
+/// How many splats ahead of the one at work the next ones are fetched.
+const AHEAD: usize = 6;
 
 /// What is the same for all regions of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -116,9 +23,14 @@ pub struct RasterFrame<'a> {
     pub samples: &'a LaneSamples,
     /// All splats, by rank.
     pub splats: &'a [VisibleSplat],
+    /// What the fragments of each share, by rank.
+    pub surfaces: &'a [SplatSurface],
+    /// Radius of the pixel filter, in pixels.
+    pub filter_radius: f32,
 }
 
-/// Rasterises some splats over a region into a buffer. Gives up, with false, when the buffer exceeds its budget.
+/// Rasterises some splats over a region, which lies within one tile, until the buffer takes no more. Gives the number of
+/// samples tested.
 #[derive(Debug)]
 pub struct RasterJob<'a> {
     /// The frame.
@@ -127,21 +39,25 @@ pub struct RasterJob<'a> {
     pub ranks: &'a [u32],
     /// The pixels.
     pub region: PixelRect,
-    /// Records that the buffer may hold, unless the region is a single pixel.
-    pub budget: usize,
-    /// Where the records go.
-    pub buffer: &'a mut RecordBuffer,
+    /// Where the fragments go.
+    pub records: &'a mut RecordBuffer,
+    /// Scratch.
+    pub places: &'a mut PlaceList,
 }
 
 impl Kernel for RasterJob<'_> {
-    type Output = bool;
+    type Output = u64;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
-        match self.frame.rasterizer.form() {
-            Form::Pinhole => self.rasterize::<L, PINHOLE>(),
-            Form::ThinLens => self.rasterize::<L, THIN_LENS>(),
-            Form::Orthographic => self.rasterize::<L, ORTHOGRAPHIC>(),
+    fn run<L: Lanes>(self) -> u64 {
+        // A copy of the loop for each form of the evaluation and each way to read the table: nothing is decided inside.
+        match (self.frame.rasterizer.form(), self.frame.rasterizer.table().quartic()) {
+            (Form::Pinhole, Some(table)) => self.rasterize::<L, _, PINHOLE>(table),
+            (Form::Pinhole, None) => self.rasterize::<L, _, PINHOLE>(self.frame.rasterizer.table()),
+            (Form::ThinLens, Some(table)) => self.rasterize::<L, _, THIN_LENS>(table),
+            (Form::ThinLens, None) => self.rasterize::<L, _, THIN_LENS>(self.frame.rasterizer.table()),
+            (Form::Orthographic, Some(table)) => self.rasterize::<L, _, ORTHOGRAPHIC>(table),
+            (Form::Orthographic, None) => self.rasterize::<L, _, ORTHOGRAPHIC>(self.frame.rasterizer.table()),
         }
     }
 }
@@ -153,98 +69,184 @@ const ORTHOGRAPHIC: u8 = 2;
 
 impl RasterJob<'_> {
     #[inline(always)]
-    fn rasterize<L: Lanes, const FORM: u8>(self) -> bool {
-        let Self { frame, ranks, region, budget, buffer } = self;
-        buffer.clear();
-        for &rank in ranks {
-            rasterize_splat::<L, FORM>(&frame, rank, &region, buffer);
-            if buffer.len() > budget && region.area() > 1 {
-                return false;
+    fn rasterize<L: Lanes, T: LaneTable, const FORM: u8>(self, table: &T) -> u64 {
+        let Self { frame, ranks, region, records, places } = self;
+        let mut tests = 0;
+        for (i, &rank) in ranks.iter().enumerate() {
+            if let Some(&next) = ranks.get(i + AHEAD) {
+                prefetch(&frame.splats[next as usize]);
+                prefetch(&frame.surfaces[next as usize]);
+            }
+            let splat = &frame.splats[rank as usize];
+            places.fill::<L>(splat, &region, frame.filter_radius);
+            let cells = places.places().len() * frame.samples.groups();
+            let Some(page) = records.begin(rank, &frame.surfaces[rank as usize], cells) else { break };
+            tests += (places.places().len() * frame.samples.samples()) as u64;
+            let splat = Evaluation::<L, T>::new(&frame, splat, table);
+            if splat.splat.plain {
+                splat.rasterize::<FORM, true>(places, page);
+            } else {
+                splat.rasterize::<FORM, false>(places, page);
             }
         }
-        true
+        tests
     }
 }
 
-/// Tests all samples of a splat's candidate pixels in the region.
-#[inline(always)]
-fn rasterize_splat<L: Lanes, const FORM: u8>(
-    frame: &RasterFrame<'_>,
-    rank: u32,
-    region: &PixelRect,
-    buffer: &mut RecordBuffer,
-) {
-    let splat = &frame.splats[rank as usize];
-    let lane_splat = LaneSplat::<L>::new(&splat.constants);
-    let limits = limits::<L>(frame.rasterizer);
-    let fraction = [L::splat(splat.constants.xf), L::splat(splat.constants.yf)];
-    let groups = frame.samples.groups();
-    let candidates = splat.bounds.intersect(region);
-    for y in candidates.y0..candidates.y1 {
-        let row = L::splat((y - splat.constants.yi) as f32);
-        for x in candidates.x0..candidates.x1 {
-            let column = L::splat((x - splat.constants.xi) as f32);
-            let pixel = (y - region.y0) as usize * region.width() + (x - region.x0) as usize;
-            let [filter_pattern, lens_pattern] = frame.rasterizer.samples().patterns_of(x, y);
-            for (group, [jx, jy]) in frame.samples.jitter(filter_pattern).iter().enumerate() {
-                let d = [column + (L::load(jx) - fraction[0]), row + (L::load(jy) - fraction[1])];
-                let hits = match FORM {
-                    PINHOLE => lane_splat.pinhole(d, &limits),
-                    THIN_LENS => lane_splat.thin_lens(d, &frame.samples.lens(lens_pattern, group), &limits),
-                    _ => lane_splat.orthographic(d, &limits),
-                };
-                let live = frame.samples.live(group);
-                buffer.tests += u64::from(live.count_ones());
-                if hits.mask & live != 0 {
-                    store(frame, splat, rank, (pixel * groups + group) as u32, &hits, live, buffer);
+/// A group of the samples of a pixel: its place in its tile, and the group's number.
+type Cell = (u16, usize);
+
+/// A splat ready to be evaluated in a frame.
+struct Evaluation<'a, L, T> {
+    samples: &'a LaneSamples,
+    splat: &'a VisibleSplat,
+    table: &'a T,
+    culls: bool,
+    lane_splat: LaneSplat<L>,
+    limits: LaneLimits<L>,
+    fraction: [L; 2],
+    weight_scale: L,
+}
+
+impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
+    #[inline(always)]
+    fn new(frame: &RasterFrame<'a>, splat: &'a VisibleSplat, table: &'a T) -> Self {
+        Self {
+            samples: frame.samples,
+            splat,
+            table,
+            culls: frame.rasterizer.culls(),
+            lane_splat: LaneSplat::new(&splat.constants),
+            limits: limits(frame.rasterizer),
+            fraction: [L::splat(splat.constants.xf), L::splat(splat.constants.yf)],
+            weight_scale: L::splat(splat.weight_scale),
+        }
+    }
+
+    /// Tests all samples of a list of pixels. `PLAIN` is that of the splat, here and below.
+    #[inline(always)]
+    fn rasterize<const FORM: u8, const PLAIN: bool>(&self, list: &PlaceList, mut page: Page<'_>) {
+        let groups = self.samples.groups();
+        if groups == 1 {
+            let mut pairs = list.places().chunks_exact(L::CELLS);
+            for places in &mut pairs {
+                if L::CELLS == 2 {
+                    self.test::<FORM, PLAIN, true>(list, [(places[0], 0), (places[1], 0)], 1, &mut page);
+                } else {
+                    self.test::<FORM, PLAIN, false>(list, [(places[0], 0); 2], 1, &mut page);
+                }
+            }
+            if let [place] = pairs.remainder() {
+                self.test::<FORM, PLAIN, false>(list, [(*place, 0); 2], 1, &mut page);
+            }
+        } else {
+            for &place in list.places() {
+                for group in (0..groups).step_by(L::CELLS) {
+                    if L::CELLS == 2 && group + 1 < groups {
+                        let cells = [(place, group), (place, group + 1)];
+                        self.test::<FORM, PLAIN, true>(list, cells, groups, &mut page);
+                    } else {
+                        self.test::<FORM, PLAIN, false>(list, [(place, group); 2], groups, &mut page);
+                    }
                 }
             }
         }
+        page.close();
     }
-}
 
-/// Stores the fragments of some hits: one record, or one a facing where the lens sees both.
-#[inline(always)]
-fn store<L: Lanes>(
-    frame: &RasterFrame<'_>,
-    splat: &VisibleSplat,
-    rank: u32,
-    cell: u32,
-    hits: &LaneHits<L>,
-    live: u32,
-    buffer: &mut RecordBuffer,
-) {
-    let mask = hits.mask & live;
-    let weight = L::splat(splat.weight_scale) * kernel_values(frame.rasterizer.table(), hits.r2, mask);
-    let mask = mask & weight.greater(L::splat(0.0)).bits();
-    let flipped = if splat.flips { hits.flipped } else { 0 };
-    let backs = if splat.back { !flipped } else { flipped };
-    for (back, lanes) in [(false, mask & !backs), (true, mask & backs)] {
-        if lanes == 0 || (back && frame.rasterizer.culls()) {
-            continue;
+    /// Tests the samples of a cell, or if `BOTH` of two.
+    #[inline(always)]
+    fn test<const FORM: u8, const PLAIN: bool, const BOTH: bool>(
+        &self,
+        list: &PlaceList,
+        cells: [Cell; 2],
+        groups: usize,
+        page: &mut Page<'_>,
+    ) {
+        let hits = self.evaluate::<FORM, PLAIN>(list, cells);
+        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.mask);
+        let hit = hits.mask & weight.greater(L::splat(0.0));
+        let numbers = [
+            usize::from(cells[0].0) * groups + cells[0].1,
+            usize::from(cells[1].0) * groups + cells[1].1,
+        ];
+        let (back, depth) = (self.splat.back, hits.depth);
+        if FORM != THIN_LENS {
+            put::<L, BOTH>(page, numbers, back, &Hits { hit, depth, weight });
+            return;
         }
-        let selected = L::mask(lanes);
-        let record = Record {
-            depth: selected.select(hits.depth, L::splat(f32::INFINITY)).to_array(),
-            weight: (weight & selected).to_array(),
-        };
-        buffer.push(RecordKey { cell, rank, back }, record, lanes.count_ones());
+        // A lens may see both sides.
+        let flipped = if self.splat.flips { hits.flipped & hit } else { L::splat(0.0) };
+        if flipped.bits() != 0 && !(self.culls && !back) {
+            put::<L, BOTH>(page, numbers, !back, &Hits { hit: flipped, depth, weight });
+        }
+        if !(self.culls && back) {
+            put::<L, BOTH>(page, numbers, back, &Hits { hit: hit.and_not(flipped), depth, weight });
+        }
+    }
+
+    /// The hits in one cell (given twice), or in two.
+    #[inline(always)]
+    fn evaluate<const FORM: u8, const PLAIN: bool>(&self, list: &PlaceList, cells: [Cell; 2]) -> LaneHits<L> {
+        let [first, second] = cells;
+        let (jitter_a, jitter_b) =
+            (self.samples.jitter(first.0, first.1), self.samples.jitter(second.0, second.1));
+        let (offset_a, offset_b) = (list.offset(first.0), list.offset(second.0));
+        let jitter = [
+            L::load_cells(&jitter_a[0], &jitter_b[0]) - self.fraction[0],
+            L::load_cells(&jitter_a[1], &jitter_b[1]) - self.fraction[1],
+        ];
+        let d = [
+            L::splat_cells(offset_a[0], offset_b[0]) + jitter[0],
+            L::splat_cells(offset_a[1], offset_b[1]) + jitter[1],
+        ];
+        match FORM {
+            PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
+            THIN_LENS => self.lane_splat.thin_lens::<PLAIN>(d, &self.samples.lens(cells), &self.limits),
+            _ => self.lane_splat.orthographic(d, &self.limits),
+        }
     }
 }
 
-/// [`KernelTable::weight`] for a sample a lane; lanes outside of the mask hold arbitrary values.
+/// Puts the hits of one cell, or if `BOTH` of two, on a page.
 #[inline(always)]
-fn kernel_values<L: Lanes>(table: &KernelTable, r2: L, mask: u32) -> L {
-    let Some(quartic) = table.quartic() else {
-        let r2 = r2.to_array();
-        let value = |lane: usize| if mask >> lane & 1 == 1 { table.weight(r2[lane]) } else { 0.0 };
-        return L::load(&std::array::from_fn(value));
-    };
-    let position = r2 * L::splat(quartic.scale);
-    // The second operand comes out where the first one is not a number.
-    let bin = position.least(L::splat((QUARTIC_BINS - 1) as f32)).truncate();
-    let t = position - bin;
-    let [c0, c1, c2, c3, c4] = &quartic.coefficients;
-    let c = |coefficients| bin.look_up(coefficients);
-    (((c(c4) * t + c(c3)) * t + c(c2)) * t + c(c1)) * t + c(c0)
+fn put<L: Lanes, const BOTH: bool>(page: &mut Page<'_>, cells: [usize; 2], back: bool, hits: &Hits<L>) {
+    page.put::<L, 0>(cells[0], back, hits);
+    if BOTH {
+        page.put::<L, 1>(cells[1], back, hits);
+    }
+}
+
+/// A table of the kernel that lanes can read.
+trait LaneTable {
+    /// [`KernelTable::weight`] for a sample a lane; arbitrary where `mask` is not set.
+    fn kernel<L: Lanes>(&self, r2: L, mask: L) -> L;
+}
+
+impl LaneTable for Quartic {
+    #[inline(always)]
+    fn kernel<L: Lanes>(&self, r2: L, _: L) -> L {
+        let position = r2 * L::splat(self.scale);
+        let bin = position.least(L::splat((QUARTIC_BINS - 1) as f32)).round_down();
+        let t = position - bin;
+        let [c0, c1, c2, c3, c4] = &self.coefficients;
+        let high = (bin.look_up(c4) * t + bin.look_up(c3)) * t + bin.look_up(c2);
+        (high * t + bin.look_up(c1)) * t + bin.look_up(c0)
+    }
+}
+
+impl LaneTable for KernelTable {
+    #[inline(always)]
+    fn kernel<L: Lanes>(&self, r2: L, mask: L) -> L {
+        let mut values = [[0.0; LANES]; 2];
+        r2.store_cell::<0>(&mut values[0]);
+        if L::CELLS == 2 {
+            r2.store_cell::<1>(&mut values[1]);
+        }
+        let bits = mask.bits();
+        for (lane, value) in values.as_flattened_mut().iter_mut().enumerate().take(LANES * L::CELLS) {
+            *value = if bits >> lane & 1 == 1 { self.weight(*value) } else { 0.0 };
+        }
+        L::load_cells(&values[0], &values[1])
+    }
 }

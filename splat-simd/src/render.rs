@@ -1,7 +1,9 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
 use crate::lanes::{LANES, Level};
-use crate::raster::{RasterFrame, RasterJob, RecordBuffer};
+use crate::places::{PlaceList, place_of};
+use crate::raster::{RasterFrame, RasterJob};
+use crate::records::RecordBuffer;
 use crate::resolve::ResolveJob;
 use crate::samples::LaneSamples;
 use rayon::prelude::*;
@@ -32,6 +34,7 @@ pub struct Renderer {
 #[derive(Debug, Default)]
 struct Worker {
     records: RecordBuffer,
+    places: PlaceList,
     fragments: Vec<Fragment>,
 }
 
@@ -112,7 +115,12 @@ impl Renderer {
             surfaces: frame.set_up.surfaces(),
             level: self.level,
         };
-        let mut film = Film::new([camera.width, camera.height], window, options.aovs);
+        let mut film = picture.pixels().empty_film(
+            [camera.width, camera.height],
+            window,
+            frame.rasterizer.range().len(),
+        );
+        statistics.samples = (window.area() * frame.rasterizer.range().len()) as u64;
         film.position_origin = cloud.origin;
         let (count, batch) = (tiles.len(), TILES_A_REPORT * self.threads());
         for (number, tiles) in tiles.chunks(batch).enumerate() {
@@ -120,6 +128,7 @@ impl Renderer {
             let finished: Vec<Tile> = self.threads.install(|| {
                 tiles
                     .par_iter()
+                    .filter(|(_, ranks)| !ranks.is_empty())
                     .map(|(region, ranks)| self.with_worker(|worker| picture.tile(worker, region, ranks)))
                     .collect()
             });
@@ -147,13 +156,12 @@ impl Renderer {
 fn add(sum: &mut Statistics, tile: &Statistics) {
     sum.tests += tile.tests;
     sum.fragments += tile.fragments;
-    sum.samples += tile.samples;
     sum.raster += tile.raster;
     sum.resolve += tile.resolve;
 }
 
 /// [`splat_core::setup::set_up`] in parallel.
-fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
+pub(crate) fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
     let chunks: Vec<SetUp> = (0..cloud.len().div_ceil(SET_UP_CHUNK))
         .into_par_iter()
         .map(|chunk| {
@@ -173,19 +181,17 @@ fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
 }
 
 impl Picture<'_> {
+    fn pixels(&self) -> PixelResolver<'_> {
+        let splats = &self.frame.set_up.splats;
+        PixelResolver::new(self.cloud, self.camera, self.options, &self.frame.view, splats, &self.surfaces)
+    }
+
     /// Renders a tile.
     fn tile(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Tile {
-        let mut film = Film::new([self.camera.width, self.camera.height], *region, self.options.aovs);
+        let mut pixels = self.pixels();
+        let frame = [self.camera.width, self.camera.height];
+        let mut film = pixels.empty_film(frame, *region, self.samples.samples());
         let mut statistics = Statistics::default();
-        let splats = &self.frame.set_up.splats;
-        let mut pixels = PixelResolver::new(
-            self.cloud,
-            self.camera,
-            self.options,
-            &self.frame.view,
-            splats,
-            &self.surfaces,
-        );
         self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics);
         Tile { film, statistics }
     }
@@ -201,25 +207,22 @@ impl Picture<'_> {
         statistics: &mut Statistics,
     ) {
         let start = Instant::now();
-        let frame = RasterFrame {
-            rasterizer: &self.frame.rasterizer,
-            samples: &self.samples,
-            splats: &self.frame.set_up.splats,
-        };
-        let budget = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
-        let job = RasterJob { frame, ranks, region: *region, budget, buffer: &mut worker.records };
-        let complete = self.level.run(job);
-        if !complete {
+        let Worker { records, places, .. } = worker;
+        let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
+        records.clear(self.samples.groups(), if region.area() > 1 { limit } else { usize::MAX });
+        let frame = self.raster_frame();
+        let tests = self.level.run(RasterJob { frame, ranks, region: *region, sink: records, places });
+        if !records.is_complete() {
             statistics.raster += start.elapsed();
             for quarter in quarters(region) {
                 self.region(worker, &quarter, ranks, pixels, film, statistics);
             }
             return;
         }
-        worker.records.group(region.area() * self.samples.groups());
+        records.group();
         statistics.raster += start.elapsed();
-        statistics.tests += worker.records.tests;
-        statistics.fragments += worker.records.fragments;
+        statistics.tests += tests;
+        statistics.fragments += records.fragments;
         let start = Instant::now();
         match (self.options.resolve, self.options.aovs) {
             (Resolve::Surface { coverage, thickness: Thickness::AroundHit }, aovs) if few(aovs) => {
@@ -227,8 +230,17 @@ impl Picture<'_> {
             }
             _ => self.resolve_each(worker, region, pixels, film),
         }
-        statistics.samples += (region.area() * self.frame.rasterizer.range().len()) as u64;
         statistics.resolve += start.elapsed();
+    }
+
+    fn raster_frame(&self) -> RasterFrame<'_> {
+        RasterFrame {
+            rasterizer: &self.frame.rasterizer,
+            samples: &self.samples,
+            splats: &self.frame.set_up.splats,
+            surfaces: &self.surfaces,
+            filter_radius: self.frame.view.filter_radius as f32,
+        }
     }
 
     /// Resolves eight samples at once.
@@ -240,12 +252,13 @@ impl Picture<'_> {
         pixels: &mut PixelResolver<'_>,
         film: &mut Film,
     ) {
-        self.level.run(ResolveJob {
+        self.level.run_single(ResolveJob {
             region: *region,
             buffer: &worker.records,
             samples: &self.samples,
-            surfaces: &self.surfaces,
             coverage,
+            two_sided: self.cloud.oriented && !self.options.cull,
+            opaque: self.cloud.opacities.is_none(),
             pixels,
             film,
         });
@@ -262,17 +275,17 @@ impl Picture<'_> {
     ) {
         let range = self.frame.rasterizer.range();
         let groups = self.samples.groups();
-        let Worker { records, fragments } = worker;
+        let Worker { records, fragments, .. } = worker;
         for y in region.y0..region.y1 {
             for x in region.x0..region.x1 {
-                let pixel = (y - region.y0) as usize * region.width() + (x - region.x0) as usize;
+                let first = usize::from(place_of(x, y)) * groups;
                 pixels.start();
                 for sample in range.clone() {
                     let number = sample - range.start;
-                    let cell = records.cell(pixel * groups + number / LANES);
+                    let cell = records.cell(first + number / LANES);
                     fragments.clear();
                     fragments
-                        .extend(cell.iter().filter_map(|&record| records.fragment(record, number % LANES)));
+                        .extend(cell.iter().filter_map(|&entry| records.fragment(entry, number % LANES)));
                     let place = SamplePlace { x, y, sample };
                     pixels.add(place, fragments, self.frame.rasterizer.samples());
                 }
@@ -286,131 +299,4 @@ impl Picture<'_> {
 fn few(aovs: AovSelection) -> bool {
     let AovSelection { depth, normal, albedo, position, id, layers, .. } = aovs;
     !(depth || normal || albedo || position || id || layers)
-}
-
-/// Gives every fragment of a picture to `sink`, as [`splat_core::fragments()`] does: splat by splat in splat order, each
-/// splat's by pixel, row by row, and sample. Returns the number of samples tested.
-///
-/// # Errors
-/// As [`render`].
-pub fn fragments(
-    cloud: &Cloud,
-    camera: &Camera,
-    options: &RenderOptions,
-    level: Level,
-    sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
-) -> Result<u64, Error> {
-    let frame = Frame::new(cloud, camera, options, set_up)?;
-    let samples = LaneSamples::new(&frame.rasterizer);
-    let mut buffer = RecordBuffer::default();
-    let mut tests = 0;
-    for (rank, splat) in frame.set_up.splats.iter().enumerate() {
-        tests += splat_fragments(&frame, &samples, level, rank, &mut buffer, &mut |place, fragment| {
-            sink(place, splat.index, fragment);
-        });
-    }
-    Ok(tests)
-}
-
-/// The fragments of one splat, by pixel and sample. Returns the number of samples tested.
-fn splat_fragments(
-    frame: &Frame,
-    samples: &LaneSamples,
-    level: Level,
-    rank: usize,
-    buffer: &mut RecordBuffer,
-    sink: &mut dyn FnMut(SamplePlace, Fragment),
-) -> u64 {
-    let splats = &frame.set_up.splats;
-    let region = splats[rank].bounds;
-    let (groups, first) = (samples.groups(), frame.rasterizer.range().start);
-    let raster_frame = RasterFrame { rasterizer: &frame.rasterizer, samples, splats };
-    let ranks = &[rank as u32];
-    level.run(RasterJob { frame: raster_frame, ranks, region, budget: usize::MAX, buffer });
-    buffer.group(region.area() * groups);
-    for cell in 0..region.area() * groups {
-        let pixel = cell / groups;
-        let [x, y] = [pixel % region.width(), pixel / region.width()].map(|offset| offset as i32);
-        for lane in 0..LANES {
-            let sample = first + cell % groups * LANES + lane;
-            let place = SamplePlace { x: region.x0 + x, y: region.y0 + y, sample };
-            for fragment in buffer.cell(cell).iter().filter_map(|&record| buffer.fragment(record, lane)) {
-                sink(place, fragment);
-            }
-        }
-    }
-    buffer.tests
-}
-
-/// A fragment in which the two cores differ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Difference {
-    /// Pixel and sample.
-    pub place: SamplePlace,
-    /// Index of the splat in the cloud.
-    pub splat: u32,
-    /// What the reference has there.
-    pub reference: Option<Fragment>,
-    /// What the fast core has there.
-    pub fast: Option<Fragment>,
-}
-
-/// Runs both cores side by side over every splat, and gives the first fragment in which they differ, bit for bit, or
-/// else the number of fragments in which they agree. `progress` is told the finished part, from 0 to 1.
-///
-/// # Errors
-/// As [`render`].
-pub fn compare(
-    cloud: &Cloud,
-    camera: &Camera,
-    options: &RenderOptions,
-    level: Level,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Result<u64, Difference>, Error> {
-    let frame = Frame::new(cloud, camera, options, set_up)?;
-    let samples = LaneSamples::new(&frame.rasterizer);
-    let mut buffer = RecordBuffer::default();
-    let count = frame.set_up.splats.len();
-    let mut total = 0;
-    for (rank, splat) in frame.set_up.splats.iter().enumerate() {
-        if rank % 256 == 0 {
-            progress(rank as f64 / count as f64);
-        }
-        let mut reference = Vec::new();
-        frame.rasterizer.rasterize(splat, rank as u32, &splat.bounds, &mut |place, fragment| {
-            reference.push((place, fragment));
-        });
-        let mut fast = Vec::with_capacity(reference.len());
-        splat_fragments(&frame, &samples, level, rank, &mut buffer, &mut |place, fragment| {
-            fast.push((place, fragment));
-        });
-        // One order for both: rows, columns, samples.
-        let key = |place: &SamplePlace| (place.y, place.x, place.sample);
-        reference.sort_by_key(|(place, _)| key(place));
-        fast.sort_by_key(|(place, _)| key(place));
-        if let Some(difference) = first_difference(&reference, &fast, splat.index) {
-            return Ok(Err(difference));
-        }
-        total += reference.len() as u64;
-    }
-    Ok(Ok(total))
-}
-
-/// The first place at which two sorted lists of a splat's fragments differ.
-fn first_difference(
-    reference: &[(SamplePlace, Fragment)],
-    fast: &[(SamplePlace, Fragment)],
-    splat: u32,
-) -> Option<Difference> {
-    let bits = |(place, f): &(SamplePlace, Fragment)| {
-        ((place.y, place.x, place.sample), f.rank(), f.is_back(), f.depth.to_bits(), f.weight.to_bits())
-    };
-    let same = reference.iter().zip(fast).take_while(|(a, b)| bits(a) == bits(b)).count();
-    let next = [reference.get(same), fast.get(same)];
-    let place = next.iter().flatten().map(|(place, _)| *place).min_by_key(|p| (p.y, p.x, p.sample))?;
-    let at_place = |entry: Option<&(SamplePlace, Fragment)>| {
-        entry.filter(|(other, _)| *other == place).map(|(_, fragment)| *fragment)
-    };
-    let [reference, fast] = next.map(at_place);
-    Some(Difference { place, splat, reference, fast })
 }

@@ -1,21 +1,22 @@
 //! The samples of a frame in the order in which lanes want them.
 
 use crate::evaluate::{LaneLensPoint, LaneLimits};
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{Eight, LANES, Lanes};
+use crate::places::{PLACES, pixel_of};
 use splat_core::raster::Rasterizer;
 use splat_core::sampling::PATTERNS;
 
-/// One value for each of eight samples.
-type Eight = [f32; LANES];
-
-/// The positions and lens points of every pattern, in groups of eight samples of which the last may be padded.
+/// The positions and lens points of every pattern, in cells of eight samples of which the last may be padded.
+///
+/// The position of a padded lane is not a number, so it never hits.
 #[derive(Debug)]
 pub struct LaneSamples {
     groups: usize,
-    /// The lanes of the last group that are samples, as bits.
-    last_group: u32,
+    samples: usize,
     jitter: Vec<[Eight; 2]>,
     lens: Vec<[Eight; 4]>,
+    /// For each place of a tile, where its cells begin in `jitter` and in `lens`.
+    first: Box<[[u32; 2]; PLACES]>,
 }
 
 impl LaneSamples {
@@ -24,61 +25,80 @@ impl LaneSamples {
         let range = rasterizer.range();
         let samples = rasterizer.samples();
         let groups = range.len().div_ceil(LANES);
-        let spare = groups * LANES - range.len();
-        // A padded lane repeats the group's first sample: harmless numbers.
-        let sample = |group: usize, lane: usize| {
+        let number = |group: usize, lane: usize| {
             let number = range.start + group * LANES + lane;
-            if number < range.end { number } else { range.start + group * LANES }
+            (number < range.end).then_some(number)
         };
         let cells = || (0..PATTERNS).flat_map(|pattern| (0..groups).map(move |group| (pattern, group)));
         let jitter = cells().map(|(pattern, group)| {
             let points = samples.jitter_of_pattern(pattern);
-            [0, 1].map(|axis| std::array::from_fn(|lane| points[sample(group, lane)][axis]))
+            [0, 1].map(|axis| {
+                std::array::from_fn(|lane| number(group, lane).map_or(f32::NAN, |number| points[number][axis]))
+            })
         });
-        let lens = cells().filter(|&(pattern, _)| !samples.lens_of_pattern(pattern).is_empty()).map(
-            |(pattern, group)| {
-                let points = samples.lens_of_pattern(pattern);
-                let value = |value: usize, lane: usize| {
-                    let point = &points[sample(group, lane)];
+        let with_lens = cells().filter(|&(pattern, _)| !samples.lens_of_pattern(pattern).is_empty());
+        let lens = with_lens.map(|(pattern, group)| {
+            let points = samples.lens_of_pattern(pattern);
+            let value = |value: usize, lane: usize| {
+                number(group, lane).map_or(0.0, |number| {
+                    let point = &points[number];
                     [point.p[0], point.p[1], point.p_over_focus[0], point.p_over_focus[1]][value]
-                };
-                [0, 1, 2, 3].map(|number| std::array::from_fn(|lane| value(number, lane)))
-            },
-        );
+                })
+            };
+            [0, 1, 2, 3].map(|number| std::array::from_fn(|lane| value(number, lane)))
+        });
+        let first = |place| {
+            let [x, y] = pixel_of(place as u16);
+            samples.patterns_of(x, y).map(|pattern| (pattern * groups) as u32)
+        };
         Self {
             groups,
-            last_group: u32::from(u8::MAX) >> spare,
+            samples: range.len(),
             jitter: jitter.collect(),
             lens: lens.collect(),
+            first: Box::new(std::array::from_fn(first)),
         }
     }
 
-    /// Number of groups of eight samples a pixel.
+    /// Number of cells a pixel.
     pub fn groups(&self) -> usize {
         self.groups
     }
 
-    /// The lanes of a group that are samples, as bits.
-    #[inline(always)]
-    pub fn live(&self, group: usize) -> u32 {
-        if group + 1 == self.groups { self.last_group } else { u32::from(u8::MAX) }
+    /// Number of samples a pixel.
+    pub fn samples(&self) -> usize {
+        self.samples
     }
 
-    /// The groups of a pattern: positions relative to the pixel's corner.
-    #[inline(always)]
-    pub fn jitter(&self, pattern: usize) -> &[[Eight; 2]] {
-        &self.jitter[pattern * self.groups..][..self.groups]
+    /// Number of samples in a cell of a pixel.
+    pub fn samples_of(&self, group: usize) -> usize {
+        LANES.min(self.samples - group * LANES)
     }
 
-    /// The lens points of a group of a pattern.
+    /// The cell of a place: positions relative to the pixel's corner.
     #[inline(always)]
-    pub fn lens<L: Lanes>(&self, pattern: usize, group: usize) -> LaneLensPoint<L> {
-        let [px, py, fx, fy] = &self.lens[pattern * self.groups + group];
-        LaneLensPoint { p: [L::load(px), L::load(py)], p_over_focus: [L::load(fx), L::load(fy)] }
+    pub fn jitter(&self, place: u16, group: usize) -> &[Eight; 2] {
+        &self.jitter[self.first[usize::from(place)][0] as usize + group]
+    }
+
+    /// The lens points of two cells.
+    #[inline(always)]
+    pub fn lens<L: Lanes>(&self, [first, second]: [(u16, usize); 2]) -> LaneLensPoint<L> {
+        let (a, b) = (self.lens_points(first), self.lens_points(second));
+        LaneLensPoint {
+            p: [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])],
+            p_over_focus: [L::load_cells(&a[2], &b[2]), L::load_cells(&a[3], &b[3])],
+        }
+    }
+
+    #[inline(always)]
+    fn lens_points(&self, (place, group): (u16, usize)) -> &[Eight; 4] {
+        &self.lens[self.first[usize::from(place)][1] as usize + group]
     }
 }
 
 /// The limits of a frame, in lanes.
+#[inline(always)]
 pub fn limits<L: Lanes>(rasterizer: &Rasterizer) -> LaneLimits<L> {
     LaneLimits::new(rasterizer.limits())
 }

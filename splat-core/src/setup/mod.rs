@@ -5,11 +5,13 @@
 mod bounds;
 mod error_bound;
 mod margin;
+mod outline;
 mod projection;
 mod view;
 
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
+pub use outline::Outline;
 pub use projection::project;
 pub(crate) use view::Reach;
 pub use view::View;
@@ -27,7 +29,7 @@ use std::ops::Range;
 const MAX_MAGNITUDE: f32 = 1e9;
 
 /// Boxes are widened by this, in pixels, besides the margin for rounding: they only propose candidates.
-const BOX_PADDING: f64 = 1.0 / 64.0;
+pub const BOX_PADDING: f64 = 1.0 / 64.0;
 
 /// Linear colour of splats without one: white as a plain colour, light grey under the headlight.
 const UNCOLORED: [f32; 3] = [1.0; 3];
@@ -56,6 +58,8 @@ pub struct VisibleSplat {
     pub constants: SplatConstants<f32>,
     /// The pixels in which it may be hit; never empty.
     pub bounds: PixelRect,
+    /// An ellipse around the places within `bounds` from which it may be hit.
+    pub outline: Outline,
     /// Its index in the cloud.
     pub index: u32,
     /// Factor from the kernel's value to the fragment's weight.
@@ -155,9 +159,12 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
     if !constants.is_finite() {
         return Outcome::EdgeOn;
     }
+    let hit_radius = margin.radius.max(usual);
+    let blur = view.circle_of_confusion(view.depth_extent(&splat, hit_radius)) * view.pixel_scale;
     Outcome::Visible(VisibleSplat {
         constants,
         bounds,
+        outline: Outline::new(&exact, view.orthographic, hit_radius, blur.to_array()),
         index: index as u32,
         weight_scale: weight_scale(cloud, index, options),
         back: splat.back,

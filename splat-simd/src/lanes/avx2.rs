@@ -1,4 +1,4 @@
-//! Lanes in 256-bit registers of x86-64. The only module with unsafe code: the intrinsics.
+//! Lanes in 256-bit registers of x86-64. With its sibling for 512 bits the only module with unsafe code: the intrinsics.
 //!
 //! Soundness: a value of type [`Avx2`] is only ever made by code under [`run`], which asks the processor first; so
 //! whoever holds one may use the instructions. The methods are `#[inline(always)]`, so that they become instructions of the
@@ -6,7 +6,8 @@
 
 #![expect(unsafe_code, reason = "intrinsics; see the module's documentation")]
 
-use super::{Kernel, LANES, Lanes};
+use super::{Eight, Kernel, Lanes};
+use std::arch::is_x86_feature_detected;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -14,18 +15,34 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
 
+/// Whether the processor has AVX2, and the bit instructions that came with it.
+pub fn is_available() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+}
+
 /// Runs a kernel on these lanes, or on portable ones if the processor does not have the instructions.
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
     fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Avx2>()
     }
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
+    if is_available() {
+        // SAFETY: the processor has the instructions.
         unsafe { with_avx2(kernel) }
     } else {
         kernel.run::<wide::f32x8>()
     }
+}
+
+/// Asks the processor to fetch what it will soon need.
+#[inline(always)]
+pub fn prefetch<T>(item: &T) {
+    // SAFETY: every x86-64 processor has the instruction, and it never faults.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(item).cast()) }
 }
 
 /// Implements an operator by an intrinsic.
@@ -51,6 +68,8 @@ operator!(BitAnd, bitand, _mm256_and_ps);
 operator!(BitOr, bitor, _mm256_or_ps);
 
 impl Lanes for Avx2 {
+    const CELLS: usize = 1;
+
     #[inline(always)]
     fn splat(value: f32) -> Self {
         // SAFETY: see the module's documentation.
@@ -58,27 +77,20 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn load(values: &[f32; LANES]) -> Self {
-        // SAFETY: see the module's documentation; the array is as long as the register.
-        Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    fn splat_cells(first: f32, _: f32) -> Self {
+        Self::splat(first)
     }
 
     #[inline(always)]
-    fn to_array(self) -> [f32; LANES] {
-        let mut values = [0.0; LANES];
+    fn load_cells(first: &Eight, _: &Eight) -> Self {
         // SAFETY: see the module's documentation; the array is as long as the register.
-        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
-        values
+        Self(unsafe { _mm256_loadu_ps(first.as_ptr()) })
     }
 
     #[inline(always)]
-    fn mask(bits: u32) -> Self {
-        // SAFETY: see the module's documentation.
-        unsafe {
-            let place = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), place);
-            Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, place)))
-        }
+    fn store_cell<const CELL: usize>(self, to: &mut Eight) {
+        // SAFETY: see the module's documentation; the array is as long as the register.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
@@ -124,19 +136,44 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn or_not(self, mask: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        unsafe {
+            let ones = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            Self(_mm256_or_ps(self.0, _mm256_xor_ps(mask.0, ones)))
+        }
+    }
+
+    #[inline(always)]
     fn bits(self) -> u32 {
         // SAFETY: see the module's documentation.
         unsafe { _mm256_movemask_ps(self.0) as u32 }
     }
 
     #[inline(always)]
-    fn truncate(self) -> Self {
+    fn mask(bits: u32) -> Self {
         // SAFETY: see the module's documentation.
-        Self(unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(self.0) })
+        unsafe {
+            let place = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), place);
+            Self(_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, place)))
+        }
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f32; LANES]) -> Self {
+    fn square_root(self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn round_down(self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_floor_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &Eight) -> Self {
         // SAFETY: see the module's documentation; the permutation reads three bits of each index.
         unsafe {
             let entries = _mm256_loadu_ps(table.as_ptr());

@@ -2,14 +2,19 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod portable;
 
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-/// Number of lanes of every vector.
+/// Number of samples of a cell: what a record holds, and what a vector of [`Lanes`] holds once or twice.
 pub const LANES: usize = 8;
 
-/// A vector of `f32`, one lane a sample.
+/// One value for each sample of a cell.
+pub type Eight = [f32; LANES];
+
+/// A vector of `f32`, one lane a sample, over one cell of eight samples or two.
 ///
 /// Every operation rounds each lane as the scalar one does, so a kernel over lanes gives the scalar kernel's bits.
 /// Comparisons give a mask: a vector whose lanes are all ones or all zeros, for `&` and `|`.
@@ -22,17 +27,20 @@ pub trait Lanes:
     + BitAnd<Output = Self>
     + BitOr<Output = Self>
 {
+    /// Number of cells that a vector spans: 1 or 2.
+    const CELLS: usize;
+
     /// The same value in every lane.
     fn splat(value: f32) -> Self;
 
-    /// The lanes of an array.
-    fn load(values: &[f32; LANES]) -> Self;
+    /// The first value in the lanes of the first cell, the second in those of the second, if there is one.
+    fn splat_cells(first: f32, second: f32) -> Self;
 
-    /// The lanes as an array.
-    fn to_array(self) -> [f32; LANES];
+    /// The lanes of the first cell, and of the second, if there is one.
+    fn load_cells(first: &Eight, second: &Eight) -> Self;
 
-    /// The mask of which lane i is set where bit i is.
-    fn mask(bits: u32) -> Self;
+    /// Writes the lanes of a cell, 0 or 1 (which there must be).
+    fn store_cell<const CELL: usize>(self, to: &mut Eight);
 
     /// Lanes where self < other.
     fn less(self, other: Self) -> Self;
@@ -43,10 +51,10 @@ pub trait Lanes:
     /// Lanes where self > other.
     fn greater(self, other: Self) -> Self;
 
-    /// The lesser of two numbers; neither is NaN in a lane that counts.
+    /// The lesser of two numbers; `other` where one of them is NaN.
     fn least(self, other: Self) -> Self;
 
-    /// The greater of two numbers; neither is NaN in a lane that counts.
+    /// The greater of two numbers; `other` where one of them is NaN.
     fn greatest(self, other: Self) -> Self;
 
     /// Where `self`, a mask, is set the lane of `yes`, else that of `no`.
@@ -55,14 +63,29 @@ pub trait Lanes:
     /// Lanes of `self` where `mask` is not set, else 0.
     fn and_not(self, mask: Self) -> Self;
 
+    /// Lanes of `self` where `mask` is set, else all ones, which is not a number.
+    fn or_not(self, mask: Self) -> Self;
+
     /// A mask as bits, lane 0 the lowest.
     fn bits(self) -> u32;
 
-    /// The integer part of numbers in [0, 8).
-    fn truncate(self) -> Self;
+    /// The mask of which lane i is set where bit i is.
+    fn mask(bits: u32) -> Self;
+
+    /// The square root.
+    fn square_root(self) -> Self;
+
+    /// The greatest integer that is not greater, of numbers whose magnitude is below 2^31; arbitrary for others.
+    fn round_down(self) -> Self;
 
     /// For each lane, the entry of `table` whose number is the lane's integer in [0, 8).
-    fn look_up(self, table: &[f32; LANES]) -> Self;
+    fn look_up(self, table: &Eight) -> Self;
+
+    /// The lanes of one cell, in every cell.
+    #[inline(always)]
+    fn load(values: &Eight) -> Self {
+        Self::load_cells(values, values)
+    }
 }
 
 /// A computation over lanes of any kind.
@@ -70,7 +93,8 @@ pub trait Kernel {
     /// What it gives.
     type Output;
 
-    /// Runs it. Must be `#[inline(always)]`, or it loses the instruction set of its caller.
+    /// Runs it. Must be `#[inline(always)]`, as must be all that it calls on lanes, or that loses the instruction set of
+    /// its caller.
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
@@ -81,30 +105,41 @@ pub enum Level {
     Portable,
     /// 256-bit registers of x86-64.
     Avx2,
+    /// 512-bit registers of x86-64: two cells at once.
+    Avx512,
 }
 
 impl Level {
-    /// The environment variable that lowers the level: `portable` or `avx2`.
+    /// The environment variable that lowers the level: `portable`, `avx2` or `avx512`.
     pub const VARIABLE: &'static str = "SPLAT_LEVEL";
+
+    /// Every level, the lowest first.
+    const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
     /// Every level that this machine has, the lowest first.
     pub fn available() -> Vec<Self> {
-        let mut levels = vec![Self::Portable];
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            levels.push(Self::Avx2);
+        Self::ALL.into_iter().filter(|level| level.is_available()).collect()
+    }
+
+    /// Whether this machine has the level.
+    fn is_available(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::is_available(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::is_available(),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
         }
-        levels
     }
 
     /// The highest level that this machine has, or the one that [`Level::VARIABLE`] names if that is lower.
     pub fn choose() -> Self {
-        let highest = Self::available().into_iter().max().unwrap_or(Self::Portable);
-        match std::env::var(Self::VARIABLE).as_deref() {
-            Ok("portable") => Self::Portable,
-            Ok("avx2") => highest.min(Self::Avx2),
-            _ => highest,
-        }
+        let wanted = std::env::var(Self::VARIABLE).ok();
+        let limit = Self::ALL.into_iter().find(|level| wanted.as_deref() == Some(level.name()));
+        let allowed = |level: &Self| limit.is_none_or(|limit| *level <= limit);
+        Self::available().into_iter().filter(allowed).max().unwrap_or(Self::Portable)
     }
 
     /// The level's name.
@@ -112,6 +147,7 @@ impl Level {
         match self {
             Self::Portable => "portable",
             Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
         }
     }
 
@@ -120,7 +156,23 @@ impl Level {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => avx2::run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::run(kernel),
             _ => kernel.run::<wide::f32x8>(),
         }
     }
+
+    /// Runs a kernel on lanes of one cell.
+    pub fn run_single<K: Kernel>(self, kernel: K) -> K::Output {
+        self.min(Self::Avx2).run(kernel)
+    }
+}
+
+/// Asks the processor to fetch what it will soon need.
+#[inline(always)]
+pub fn prefetch<T>(item: &T) {
+    #[cfg(target_arch = "x86_64")]
+    avx2::prefetch(item);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = item;
 }

@@ -1,28 +1,29 @@
 //! Lanes of `wide`: as good as the instruction set that the program was compiled for, on any machine.
 
-use super::{LANES, Lanes};
+use super::{Eight, LANES, Lanes};
 use wide::f32x8;
 
 impl Lanes for f32x8 {
+    const CELLS: usize = 1;
+
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self::splat(value)
     }
 
     #[inline(always)]
-    fn load(values: &[f32; LANES]) -> Self {
-        Self::new(*values)
+    fn splat_cells(first: f32, _: f32) -> Self {
+        Self::splat(first)
     }
 
     #[inline(always)]
-    fn to_array(self) -> [f32; LANES] {
-        self.to_array()
+    fn load_cells(first: &Eight, _: &Eight) -> Self {
+        Self::new(*first)
     }
 
     #[inline(always)]
-    fn mask(bits: u32) -> Self {
-        let set = f32::from_bits(u32::MAX);
-        Self::new(std::array::from_fn(|lane| if bits >> lane & 1 == 1 { set } else { 0.0 }))
+    fn store_cell<const CELL: usize>(self, to: &mut Eight) {
+        *to = self.to_array();
     }
 
     #[inline(always)]
@@ -42,12 +43,13 @@ impl Lanes for f32x8 {
 
     #[inline(always)]
     fn least(self, other: Self) -> Self {
-        self.fast_min(other)
+        // Written out: what `fast_min` does with NaN depends on the instruction set.
+        self.simd_lt(other).bitselect(self, other)
     }
 
     #[inline(always)]
     fn greatest(self, other: Self) -> Self {
-        self.fast_max(other)
+        self.simd_gt(other).bitselect(self, other)
     }
 
     #[inline(always)]
@@ -61,18 +63,36 @@ impl Lanes for f32x8 {
     }
 
     #[inline(always)]
+    fn or_not(self, mask: Self) -> Self {
+        mask.bitselect(self, Self::splat(f32::from_bits(u32::MAX)))
+    }
+
+    #[inline(always)]
     fn bits(self) -> u32 {
         self.to_bitmask()
     }
 
     #[inline(always)]
-    fn truncate(self) -> Self {
-        self.trunc()
+    fn mask(bits: u32) -> Self {
+        let set = f32::from_bits(u32::MAX);
+        Self::new(std::array::from_fn(|lane| if bits >> lane & 1 == 1 { set } else { 0.0 }))
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f32; LANES]) -> Self {
-        // The mask keeps what a lane without a hit holds within the table.
+    fn square_root(self) -> Self {
+        self.sqrt()
+    }
+
+    #[inline(always)]
+    fn round_down(self) -> Self {
+        // By way of integers: `floor` is a call for each lane where SSE4.1 is not a given.
+        let truncated = Self::from_i32x8(self.fast_trunc_int());
+        truncated - (truncated.simd_gt(self) & Self::splat(1.0))
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &Eight) -> Self {
+        // The remainder keeps what a lane without a hit holds within the table.
         Self::new(self.to_array().map(|index| table[index as usize % LANES]))
     }
 }

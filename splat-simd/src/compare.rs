@@ -1,0 +1,187 @@
+//! Both cores side by side: their fragments, splat by splat.
+
+use crate::lanes::{LANES, Level};
+use crate::places::{PLACES, PlaceList, TILE, pixel_of};
+use crate::raster::{RasterFrame, RasterJob};
+use crate::records::RecordBuffer;
+use crate::render::set_up;
+use crate::samples::LaneSamples;
+use splat_abuffer::{Fragment, SplatSurface};
+use splat_core::raster::SamplePlace;
+use splat_core::render::Frame;
+use splat_core::{Camera, Cloud, Error, PixelRect, RenderOptions};
+
+/// Pixels around a splat's candidates in which [`compare`] looks for hits of the reference that neither core visits.
+const BORDER: i32 = 2;
+
+/// The fast core, one splat at a time.
+struct SplatBySplat<'a> {
+    frame: &'a Frame,
+    samples: LaneSamples,
+    surfaces: Vec<SplatSurface>,
+    level: Level,
+    records: RecordBuffer,
+    places: PlaceList,
+}
+
+impl<'a> SplatBySplat<'a> {
+    fn new(frame: &'a Frame, level: Level) -> Self {
+        Self {
+            frame,
+            samples: LaneSamples::new(&frame.rasterizer),
+            surfaces: frame.set_up.surfaces(),
+            level,
+            records: RecordBuffer::default(),
+            places: PlaceList::default(),
+        }
+    }
+
+    /// Gives the fragments of a splat to `sink`: tile by tile, then by pixel and sample. Returns the number of samples
+    /// tested.
+    fn fragments(&mut self, rank: usize, sink: &mut dyn FnMut(SamplePlace, Fragment)) -> u64 {
+        let bounds = self.frame.set_up.splats[rank].bounds;
+        let mut tests = 0;
+        for row in bounds.y0.div_euclid(TILE)..=(bounds.y1 - 1).div_euclid(TILE) {
+            for column in bounds.x0.div_euclid(TILE)..=(bounds.x1 - 1).div_euclid(TILE) {
+                tests += self.fragments_in_tile(rank, [column * TILE, row * TILE], sink);
+            }
+        }
+        tests
+    }
+
+    /// [`SplatBySplat::fragments`] in the tile of which `corner` is the first pixel.
+    fn fragments_in_tile(
+        &mut self,
+        rank: usize,
+        corner: [i32; 2],
+        sink: &mut dyn FnMut(SamplePlace, Fragment),
+    ) -> u64 {
+        let (groups, first) = (self.samples.groups(), self.frame.rasterizer.range().start);
+        let [x, y] = corner;
+        let frame = RasterFrame {
+            rasterizer: &self.frame.rasterizer,
+            samples: &self.samples,
+            splats: &self.frame.set_up.splats,
+            surfaces: &self.surfaces,
+            filter_radius: self.frame.view.filter_radius as f32,
+        };
+        self.records.clear(groups, usize::MAX);
+        let tests = self.level.run(RasterJob {
+            frame,
+            ranks: &[rank as u32],
+            region: PixelRect::new(x, y, x + TILE, y + TILE),
+            sink: &mut self.records,
+            places: &mut self.places,
+        });
+        self.records.group();
+        for cell in 0..PLACES * groups {
+            let entries = self.records.cell(cell);
+            let [column, row] = pixel_of((cell / groups) as u16);
+            for lane in (0..LANES).filter(|_| !entries.is_empty()) {
+                let sample = first + cell % groups * LANES + lane;
+                let place = SamplePlace { x: x + column, y: y + row, sample };
+                for fragment in entries.iter().filter_map(|&entry| self.records.fragment(entry, lane)) {
+                    sink(place, fragment);
+                }
+            }
+        }
+        tests
+    }
+}
+
+/// Gives every fragment of a picture to `sink`, as [`splat_core::fragments()`] does: splat by splat in splat order, but
+/// each splat's tile by tile. Returns the number of samples tested.
+///
+/// # Errors
+/// As [`splat_core::render()`].
+pub fn fragments(
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    level: Level,
+    sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
+) -> Result<u64, Error> {
+    let frame = Frame::new(cloud, camera, options, set_up)?;
+    let mut fast = SplatBySplat::new(&frame, level);
+    let splats = frame.set_up.splats.iter().enumerate();
+    Ok(splats
+        .map(|(rank, splat)| fast.fragments(rank, &mut |place, fragment| sink(place, splat.index, fragment)))
+        .sum())
+}
+
+/// A fragment in which the two cores differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Difference {
+    /// Pixel and sample.
+    pub place: SamplePlace,
+    /// Index of the splat in the cloud.
+    pub splat: u32,
+    /// What the reference has there.
+    pub reference: Option<Fragment>,
+    /// What the fast core has there.
+    pub fast: Option<Fragment>,
+}
+
+/// Runs both cores side by side over every splat, and gives the first fragment in which they differ, bit for bit, or
+/// else the number of fragments in which they agree. The reference tests every sample of the splat's box and of a border
+/// around it, wherever the fast core looks. `progress` is told the finished part, from 0 to 1.
+///
+/// # Errors
+/// As [`splat_core::render()`].
+pub fn compare(
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    level: Level,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Result<u64, Difference>, Error> {
+    let frame = Frame::new(cloud, camera, options, set_up)?;
+    let mut core = SplatBySplat::new(&frame, level);
+    let count = frame.set_up.splats.len();
+    let (mut reference, mut fast) = (Vec::new(), Vec::new());
+    let mut total = 0;
+    for (rank, splat) in frame.set_up.splats.iter().enumerate() {
+        if rank % 256 == 0 {
+            progress(rank as f64 / count as f64);
+        }
+        let PixelRect { x0, y0, x1, y1 } = splat.bounds;
+        let near = PixelRect::new(x0 - BORDER, y0 - BORDER, x1 + BORDER, y1 + BORDER);
+        reference.clear();
+        frame.rasterizer.rasterize(
+            splat,
+            rank as u32,
+            &near.intersect(&frame.view.window),
+            &mut |place, fragment| reference.push((place, fragment)),
+        );
+        fast.clear();
+        core.fragments(rank, &mut |place, fragment| fast.push((place, fragment)));
+        // One order for both: rows, columns, samples.
+        let key = |place: &SamplePlace| (place.y, place.x, place.sample);
+        reference.sort_by_key(|(place, _)| key(place));
+        fast.sort_by_key(|(place, _)| key(place));
+        if let Some(difference) = first_difference(&reference, &fast, splat.index) {
+            return Ok(Err(difference));
+        }
+        total += reference.len() as u64;
+    }
+    Ok(Ok(total))
+}
+
+/// The first place at which two sorted lists of a splat's fragments differ.
+fn first_difference(
+    reference: &[(SamplePlace, Fragment)],
+    fast: &[(SamplePlace, Fragment)],
+    splat: u32,
+) -> Option<Difference> {
+    let bits = |(place, f): &(SamplePlace, Fragment)| {
+        ((place.y, place.x, place.sample), f.rank(), f.is_back(), f.depth.to_bits(), f.weight.to_bits())
+    };
+    let same = reference.iter().zip(fast).take_while(|(a, b)| bits(a) == bits(b)).count();
+    let next = [reference.get(same), fast.get(same)];
+    let place = next.iter().flatten().map(|(place, _)| *place).min_by_key(|p| (p.y, p.x, p.sample))?;
+    let at_place = |entry: Option<&(SamplePlace, Fragment)>| {
+        entry.filter(|(other, _)| *other == place).map(|(_, fragment)| *fragment)
+    };
+    let [reference, fast] = next.map(at_place);
+    Some(Difference { place, splat, reference, fast })
+}

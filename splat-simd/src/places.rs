@@ -1,0 +1,168 @@
+//! Which pixels of a tile a splat may be hit from, row by row.
+
+use crate::lanes::{Eight, LANES, Lanes};
+use splat_core::PixelRect;
+use splat_core::setup::{BOX_PADDING, VisibleSplat};
+
+/// Side of a tile, in pixels. That of the table of sample patterns, so that all tiles share one table.
+pub const TILE: i32 = 32;
+
+/// Number of pixels of a tile. A pixel's *place* is its number in its tile, row by row.
+pub const PLACES: usize = (TILE * TILE) as usize;
+
+/// Number of bits of a place that are its column.
+const COLUMN_BITS: u32 = TILE.trailing_zeros();
+
+/// The place of a pixel of the frame.
+#[inline(always)]
+pub fn place_of(x: i32, y: i32) -> u16 {
+    ((y & (TILE - 1)) << COLUMN_BITS | x & (TILE - 1)) as u16
+}
+
+/// Column and row of a place in its tile.
+#[inline(always)]
+pub fn pixel_of(place: u16) -> [i32; 2] {
+    let place = i32::from(place);
+    [place & (TILE - 1), place >> COLUMN_BITS]
+}
+
+/// A list of places, and what each column and row of their tile is for the evaluation.
+#[derive(Debug)]
+pub struct PlaceList {
+    /// Room for a row more: rows are written whole, and only counted as far as they go.
+    places: [u16; PLACES + TILE as usize],
+    count: usize,
+    /// x - xi of each column of the tile, and y - yi of each row.
+    offsets: [[f32; TILE as usize]; 2],
+}
+
+impl Default for PlaceList {
+    fn default() -> Self {
+        Self { places: [0; PLACES + TILE as usize], count: 0, offsets: [[0.0; TILE as usize]; 2] }
+    }
+}
+
+impl PlaceList {
+    /// The places.
+    #[inline(always)]
+    pub fn places(&self) -> &[u16] {
+        &self.places[..self.count]
+    }
+
+    /// (x - xi, y - yi) of a place, as the reference has it.
+    #[inline(always)]
+    pub fn offset(&self, place: u16) -> [f32; 2] {
+        let [x, y] = pixel_of(place);
+        [self.offsets[0][x as usize % TILE as usize], self.offsets[1][y as usize % TILE as usize]]
+    }
+
+    /// Lists the pixels of `region`, which lies within one tile, from which a splat may be hit. `reach` is the radius of
+    /// the pixel filter.
+    #[inline(always)]
+    pub fn fill<L: Lanes>(&mut self, splat: &VisibleSplat, region: &PixelRect, reach: f32) {
+        self.count = 0;
+        let candidates = splat.bounds.intersect(region);
+        if candidates.is_empty() {
+            return;
+        }
+        let corner = [candidates.x0 & !(TILE - 1), candidates.y0 & !(TILE - 1)];
+        let center = [splat.constants.xi, splat.constants.yi];
+        for axis in 0..2 {
+            for (i, offset) in self.offsets[axis].iter_mut().enumerate() {
+                *offset = (corner[axis] + i as i32 - center[axis]) as f32;
+            }
+        }
+        if !splat.outline.is_known() {
+            for y in candidates.y0..candidates.y1 {
+                self.push_row(candidates.x0, candidates.x1, y);
+            }
+            return;
+        }
+        let rows = RowSpans::<L>::new(splat, reach);
+        let mut y = candidates.y0;
+        while y < candidates.y1 {
+            let [starts, ends] = rows.eight_rows(y - center[1]);
+            for (row, (start, end)) in starts.into_iter().zip(ends).enumerate() {
+                let y = y + row as i32;
+                if y >= candidates.y1 {
+                    return;
+                }
+                // Truncation is exact: these are integers of a few thousand at most.
+                let start = (start as i32 + center[0]).max(candidates.x0);
+                let end = (end as i32 + center[0]).min(candidates.x1);
+                self.push_row(start, end, y);
+            }
+            y += LANES as i32;
+        }
+    }
+
+    /// Appends the pixels start..end of a row; they lie within one tile.
+    #[inline(always)]
+    fn push_row(&mut self, start: i32, end: i32, y: i32) {
+        let first = place_of(start, y);
+        // As many as a row can have, without a branch; the next row overwrites those that are too many.
+        if let Some(room) = self.places.get_mut(self.count..self.count + TILE as usize) {
+            for (i, place) in room.iter_mut().enumerate() {
+                *place = first + i as u16;
+            }
+        }
+        self.count += (end - start).max(0) as usize;
+    }
+}
+
+/// The rows of an outline, eight at a time.
+struct RowSpans<L> {
+    reach: L,
+    center: [L; 2],
+    half_width: L,
+    inverse_half_height: L,
+    correlation: L,
+    narrowing: L,
+}
+
+impl<L: Lanes> RowSpans<L> {
+    #[inline(always)]
+    fn new(splat: &VisibleSplat, reach: f32) -> Self {
+        let outline = &splat.outline;
+        Self {
+            reach: L::splat(reach + BOX_PADDING as f32),
+            center: [L::splat(outline.center[0]), L::splat(outline.center[1])],
+            half_width: L::splat(outline.half_width),
+            inverse_half_height: L::splat(outline.inverse_half_height),
+            correlation: L::splat(outline.correlation),
+            narrowing: L::splat(outline.narrowing),
+        }
+    }
+
+    /// The first and the end column, relative to the splat's, of the eight rows from `row`, relative to the splat's.
+    ///
+    /// The samples of a row of pixels lie in a band of `reach` about its middle. The outline's edge x(t) = t r +- n sqrt(1 -
+    /// t^2) (half widths, t in half heights) turns at t = +-r, so its extreme in the band is where t comes nearest to that.
+    #[inline(always)]
+    fn eight_rows(&self, row: i32) -> [Eight; 2] {
+        let (zero, half, one) = (L::splat(0.0), L::splat(0.5), L::splat(1.0));
+        let iota = L::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        let middle = (L::splat(row as f32) + iota) + half - self.center[1];
+        let low = ((middle - self.reach) * self.inverse_half_height).greatest(zero - one);
+        let high = ((middle + self.reach) * self.inverse_half_height).least(one);
+        let left = self.edge([low, high], zero - self.correlation, zero - self.narrowing);
+        let right = self.edge([low, high], self.correlation, self.narrowing);
+        let room = self.reach + half;
+        let start = zero - (zero - (self.center[0] + left - room)).round_down();
+        let end = (self.center[0] + right + self.reach - half).round_down() + one;
+        // No pixel where the band passes by the outline.
+        let end = low.less_or_equal(high).select(end, start);
+        let mut spans = [[0.0; LANES]; 2];
+        start.store_cell::<0>(&mut spans[0]);
+        end.store_cell::<0>(&mut spans[1]);
+        spans
+    }
+    /// The edge's extreme in a band of heights, given where it turns.
+    #[inline(always)]
+    fn edge(&self, [low, high]: [L; 2], turn: L, narrowing: L) -> L {
+        let one = L::splat(1.0);
+        let height = turn.greatest(low).least(high);
+        let square = ((one - height) * (one + height)).greatest(L::splat(0.0));
+        self.half_width * (height * self.correlation + narrowing * square.square_root())
+    }
+}
