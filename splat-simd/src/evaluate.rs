@@ -13,8 +13,9 @@ pub struct LaneSplat<L> {
     reference: [L; 2],
     centred: bool,
     depth: L,
-    inverse_depth: L,
     depth_slope: [L; 2],
+    defocus: L,
+    lens_slope: [L; 2],
     edge_on: L,
 }
 
@@ -31,8 +32,6 @@ pub struct LaneLimits<L> {
 pub struct LaneLensPoint<L> {
     /// As [`LensPoint::p`].
     pub p: [L; 2],
-    /// As [`LensPoint::p_over_focus`].
-    pub p_over_focus: [L; 2],
 }
 
 /// Hits of several samples: lanes without a hit hold arbitrary values.
@@ -58,7 +57,7 @@ impl<L: Lanes> LaneLimits<L> {
 impl<L: Lanes> LaneLensPoint<L> {
     /// The same point in every lane.
     pub fn splat(point: &LensPoint<f32>) -> Self {
-        Self { p: point.p.map(L::splat), p_over_focus: point.p_over_focus.map(L::splat) }
+        Self { p: point.p.map(L::splat) }
     }
 }
 
@@ -72,8 +71,9 @@ impl<L: Lanes> LaneSplat<L> {
             reference: constants.reference.map(L::splat),
             centred: constants.centred,
             depth: L::splat(constants.depth),
-            inverse_depth: L::splat(constants.inverse_depth),
             depth_slope: constants.depth_slope.map(L::splat),
+            defocus: L::splat(constants.defocus),
+            lens_slope: constants.lens_slope.map(L::splat),
             edge_on: L::splat(constants.edge_on),
         }
     }
@@ -91,17 +91,15 @@ impl<L: Lanes> LaneSplat<L> {
     /// [`SplatConstants::thin_lens`] for a sample a lane.
     #[inline(always)]
     pub fn thin_lens(&self, d: [L; 2], lens: &LaneLensPoint<L>, limits: &LaneLimits<L>) -> LaneHits<L> {
-        let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
-        let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
-        let he = self.h[0] * e[0] + self.h[1] * e[1];
-        let hq = self.h[0] * q[0] + self.h[1] * q[1];
-        let g = L::splat(1.0) + he;
-        let side = L::splat(1.0) - hq;
+        let p = lens.p;
+        let m = [d[0] + p[0] * self.defocus, d[1] + p[1] * self.defocus];
+        let side = L::splat(1.0) - (self.lens_slope[0] * p[0] + self.lens_slope[1] * p[1]);
+        let g = side + (self.h[0] * m[0] + self.h[1] * m[1]);
         let inside = (g * side).greater(self.edge_on);
-        let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
-        let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
-        let nu = self.a1 * m1;
-        let nv = self.b[0] * m0 + self.b[1] * m1;
+        let t = p[0] * m[1] - p[1] * m[0];
+        let n = [m[0] + self.lens_slope[1] * t, m[1] - self.lens_slope[0] * t];
+        let nu = self.a1 * n[1];
+        let nv = self.b[0] * n[0] + self.b[1] * n[1];
         let flipped = side.less(L::splat(0.0)).bits();
         self.hits(inside, nu, nv, g, self.depth * side, flipped, limits)
     }
@@ -166,8 +164,9 @@ mod tests {
 
     fn constants() -> impl Strategy<Value = SplatConstants<f32>> {
         let pair = || [number(), number()];
-        (pair(), number(), pair(), prop_oneof![Just([0.0, 0.0]).boxed(), pair().boxed()], number(), pair())
-            .prop_map(|(h, a1, b, reference, depth, depth_slope)| SplatConstants {
+        let reference = prop_oneof![Just([0.0, 0.0]).boxed(), pair().boxed()];
+        (pair(), number(), pair(), reference, number(), pair(), number(), pair()).prop_map(
+            |(h, a1, b, reference, depth, depth_slope, defocus, lens_slope)| SplatConstants {
                 xi: 0,
                 yi: 0,
                 xf: 0.0,
@@ -178,10 +177,12 @@ mod tests {
                 reference,
                 centred: reference == [0.0, 0.0],
                 depth: depth.abs(),
-                inverse_depth: 1.0 / depth.abs().max(1e-9),
                 depth_slope,
+                defocus,
+                lens_slope,
                 edge_on: 1e-9,
-            })
+            },
+        )
     }
 
     /// Checks the lanes against the reference's hits, bit by bit.
@@ -207,7 +208,7 @@ mod tests {
             splat in constants(),
             x in proptest::array::uniform8(number()),
             y in proptest::array::uniform8(number()),
-            lens in [number(), number(), number(), number()],
+            lens in [number(), number()],
         ) {
             let limits = Limits { cutoff: 4.0, near: 1e-3, far: 1e6 };
             let lane_limits = LaneLimits::new(&limits);
@@ -218,7 +219,7 @@ mod tests {
             };
             check(&lane_splat.pinhole(d, &lane_limits), each(&|d| splat.pinhole(d, &limits)))?;
             check(&lane_splat.orthographic(d, &lane_limits), each(&|d| splat.orthographic(d, &limits)))?;
-            let point = LensPoint { p: [lens[0], lens[1]], p_over_focus: [lens[2], lens[3]] };
+            let point = LensPoint { p: lens };
             let lane_point = LaneLensPoint::splat(&point);
             check(
                 &lane_splat.thin_lens(d, &lane_point, &lane_limits),

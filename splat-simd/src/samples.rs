@@ -15,7 +15,7 @@ pub struct LaneSamples {
     /// The lanes of the last group that are samples, as bits.
     last_group: u32,
     jitter: Vec<[Eight; 2]>,
-    lens: Vec<[Eight; 4]>,
+    lens: Vec<[Eight; 2]>,
 }
 
 impl LaneSamples {
@@ -38,11 +38,7 @@ impl LaneSamples {
         let lens = cells().filter(|&(pattern, _)| !samples.lens_of_pattern(pattern).is_empty()).map(
             |(pattern, group)| {
                 let points = samples.lens_of_pattern(pattern);
-                let value = |value: usize, lane: usize| {
-                    let point = &points[sample(group, lane)];
-                    [point.p[0], point.p[1], point.p_over_focus[0], point.p_over_focus[1]][value]
-                };
-                [0, 1, 2, 3].map(|number| std::array::from_fn(|lane| value(number, lane)))
+                [0, 1].map(|axis| std::array::from_fn(|lane| points[sample(group, lane)].p[axis]))
             },
         );
         Self {
@@ -73,8 +69,8 @@ impl LaneSamples {
     /// The lens points of a group of a pattern.
     #[inline(always)]
     pub fn lens<L: Lanes>(&self, pattern: usize, group: usize) -> LaneLensPoint<L> {
-        let [px, py, fx, fy] = &self.lens[pattern * self.groups + group];
-        LaneLensPoint { p: [L::load(px), L::load(py)], p_over_focus: [L::load(fx), L::load(fy)] }
+        let [x, y] = &self.lens[pattern * self.groups + group];
+        LaneLensPoint { p: [L::load(x), L::load(y)] }
     }
 }
 

@@ -10,6 +10,7 @@ mod view;
 
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
+use margin::Margin;
 pub use projection::project;
 pub(crate) use view::Reach;
 pub use view::View;
@@ -135,15 +136,7 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
         return Outcome::Culled;
     }
     let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
-    let depth = view.depth_extent(&splat, radius);
-    let reach = view.reach(exact.pixel(), &screen);
-    let margin = match view.lens_pixels() {
-        Some(lens_pixels) => margin::with_lens(&exact, depth, &reach, lens_pixels, view),
-        None => match margin::without_lens(&exact, depth, &reach, view) {
-            Some(margin) => margin,
-            None => return Outcome::EdgeOn,
-        },
-    };
+    let Some(margin) = rounding_margin(&splat, &exact, &screen, view) else { return Outcome::EdgeOn };
     if margin.radius > usual {
         let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::EdgeOn };
         bounds = candidates(&splat, &screen, margin.radius, view);
@@ -165,6 +158,23 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
         nearest: splat.center.z - half_depth(&splat, radius),
         surface: surface(cloud, index, &splat, view, options),
     })
+}
+
+/// The margin that rounding needs; `screen` is the splat's usual box. `None` if it is seen edge-on.
+fn rounding_margin(
+    splat: &CameraSplat,
+    exact: &SplatConstants<f64>,
+    screen: &[Extent; 2],
+    view: &View,
+) -> Option<Margin> {
+    let radius = view.cutoff.sqrt();
+    let Some(lens_pixels) = view.lens_pixels() else {
+        let depth = view.depth_extent(splat, radius);
+        return margin::without_lens(exact, depth, &view.reach(exact.pixel(), screen), view);
+    };
+    let widest = margin::hit_radius(radius);
+    let reach = view.reach(exact.pixel(), &screen_box(splat, widest, view)?);
+    Some(margin::with_lens(exact, view.depth_extent(splat, widest), &reach, lens_pixels, view))
 }
 
 /// A splat of the cloud in camera space (L46-69). The camera's position is subtracted in `f64`.
