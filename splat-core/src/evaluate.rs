@@ -32,11 +32,14 @@ pub struct SplatConstants<R> {
     pub centred: bool,
     /// Depth of the reference point, in camera units.
     pub depth: R,
-    /// 1 / depth.
-    pub inverse_depth: R,
     /// Depth per sigma of u and of v, in camera units.
     pub depth_slope: [R; 2],
-    /// Lens only: a hit needs g (1 - h.q) above this. Nearer to zero the lens point all but lies in the splat's
+    /// Lens only: 1/depth - 1/focus, per camera unit. A lens point times this is how far its ray meets the plane of
+    /// depth `depth` from where the eye's does.
+    pub defocus: R,
+    /// Lens only: h / depth, the slope of 1 - side in the lens point, per pixel at depth 1.
+    pub lens_slope: [R; 2],
+    /// Lens only: a hit needs g times side above this. Nearer to zero the lens point all but lies in the splat's
     /// plane, and rounding would decide. See [`crate::setup`].
     pub edge_on: R,
 }
@@ -72,8 +75,6 @@ pub struct Limits<R> {
 pub struct LensPoint<R> {
     /// Lens radius times unit-disc point times pixel scale, x and y, in pixels at depth 1.
     pub p: [R; 2],
-    /// p / focus; zero for a focus at infinity.
-    pub p_over_focus: [R; 2],
 }
 
 impl<R: Real> SplatConstants<R> {
@@ -94,19 +95,21 @@ impl<R: Real> SplatConstants<R> {
     }
 
     /// The hit of a thin lens's sample at offset `d`, seen through the point `lens`.
+    ///
+    /// Everything is said relative to m, where the ray meets the plane of the reference point's depth: it is as small
+    /// as the splat however large the blur, so that only its own sum cancels.
     #[inline(always)]
     pub fn thin_lens(&self, d: [R; 2], lens: &LensPoint<R>, limits: &Limits<R>) -> Option<Hit<R>> {
-        let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
-        let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
-        let he = self.h[0] * e[0] + self.h[1] * e[1];
-        let hq = self.h[0] * q[0] + self.h[1] * q[1];
-        let g = R::ONE + he;
-        let side = R::ONE - hq;
+        let p = lens.p;
+        let m = [d[0] + p[0] * self.defocus, d[1] + p[1] * self.defocus];
+        let side = R::ONE - (self.lens_slope[0] * p[0] + self.lens_slope[1] * p[1]);
+        let g = side + (self.h[0] * m[0] + self.h[1] * m[1]);
         let inside = g * side > self.edge_on;
-        let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
-        let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
-        let nu = self.a1 * m1;
-        let nv = self.b[0] * m0 + self.b[1] * m1;
+        // From there along the ray to the splat.
+        let t = p[0] * m[1] - p[1] * m[0];
+        let n = [m[0] + self.lens_slope[1] * t, m[1] - self.lens_slope[0] * t];
+        let nu = self.a1 * n[1];
+        let nv = self.b[0] * n[0] + self.b[1] * n[1];
         self.hit(inside, nu, nv, g, self.depth * side, side < R::ZERO, limits)
     }
 
@@ -168,8 +171,9 @@ impl SplatConstants<f64> {
             reference: self.reference.map(|value| value as f32),
             centred: self.centred,
             depth: self.depth as f32,
-            inverse_depth: self.inverse_depth as f32,
             depth_slope: self.depth_slope.map(|value| value as f32),
+            defocus: self.defocus as f32,
+            lens_slope: self.lens_slope.map(|value| value as f32),
             edge_on: self.edge_on as f32,
         }
     }
@@ -178,12 +182,13 @@ impl SplatConstants<f64> {
 impl SplatConstants<f32> {
     /// Whether every constant is finite.
     pub fn is_finite(&self) -> bool {
-        [self.xf, self.yf, self.a1, self.depth, self.inverse_depth, self.edge_on]
+        [self.xf, self.yf, self.a1, self.depth, self.defocus, self.edge_on]
             .iter()
             .chain(&self.h)
             .chain(&self.b)
             .chain(&self.reference)
             .chain(&self.depth_slope)
+            .chain(&self.lens_slope)
             .all(|value| value.is_finite())
     }
 }

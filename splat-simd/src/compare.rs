@@ -70,7 +70,7 @@ impl<'a> SplatBySplat<'a> {
             frame,
             ranks: &[rank as u32],
             region: PixelRect::new(x, y, x + TILE, y + TILE),
-            sink: &mut self.records,
+            records: &mut self.records,
             places: &mut self.places,
         });
         self.records.group();

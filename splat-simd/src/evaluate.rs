@@ -2,7 +2,7 @@
 //! each quantity means. Where that returns early, this computes on and masks.
 
 use crate::lanes::Lanes;
-use splat_core::evaluate::{LensPoint, Limits, SplatConstants};
+use splat_core::evaluate::{Limits, SplatConstants};
 
 /// A splat's constants, each in every lane.
 #[derive(Debug, Clone, Copy)]
@@ -13,8 +13,9 @@ pub struct LaneSplat<L> {
     reference: [L; 2],
     centred: bool,
     depth: L,
-    inverse_depth: L,
     depth_slope: [L; 2],
+    defocus: L,
+    lens_slope: [L; 2],
     edge_on: L,
 }
 
@@ -24,15 +25,6 @@ pub struct LaneLimits<L> {
     cutoff: L,
     near: L,
     far: L,
-}
-
-/// A lens point a lane.
-#[derive(Debug, Clone, Copy)]
-pub struct LaneLensPoint<L> {
-    /// As [`LensPoint::p`].
-    pub p: [L; 2],
-    /// As [`LensPoint::p_over_focus`].
-    pub p_over_focus: [L; 2],
 }
 
 /// Hits of several samples: lanes without a hit hold arbitrary values.
@@ -62,13 +54,6 @@ impl<L: Lanes> LaneLimits<L> {
     }
 }
 
-impl<L: Lanes> LaneLensPoint<L> {
-    /// The same point in every lane.
-    pub fn splat(point: &LensPoint<f32>) -> Self {
-        Self { p: pair(point.p), p_over_focus: pair(point.p_over_focus) }
-    }
-}
-
 impl<L: Lanes> LaneSplat<L> {
     /// The constants in every lane.
     #[inline(always)]
@@ -80,8 +65,9 @@ impl<L: Lanes> LaneSplat<L> {
             reference: pair(constants.reference),
             centred: constants.centred,
             depth: L::splat(constants.depth),
-            inverse_depth: L::splat(constants.inverse_depth),
             depth_slope: pair(constants.depth_slope),
+            defocus: L::splat(constants.defocus),
+            lens_slope: pair(constants.lens_slope),
             edge_on: L::splat(constants.edge_on),
         }
     }
@@ -97,25 +83,22 @@ impl<L: Lanes> LaneSplat<L> {
         self.hits::<PLAIN>(inside, nu, nv, g, self.depth, L::splat(0.0), limits)
     }
 
-    /// [`SplatConstants::thin_lens`] for a sample a lane.
+    /// [`SplatConstants::thin_lens`] for a sample and a lens point `p` a lane.
     #[inline(always)]
     pub fn thin_lens<const PLAIN: bool>(
         &self,
         d: [L; 2],
-        lens: &LaneLensPoint<L>,
+        p: [L; 2],
         limits: &LaneLimits<L>,
     ) -> LaneHits<L> {
-        let e = [d[0] - lens.p_over_focus[0], d[1] - lens.p_over_focus[1]];
-        let q = [lens.p[0] * self.inverse_depth, lens.p[1] * self.inverse_depth];
-        let he = self.h[0] * e[0] + self.h[1] * e[1];
-        let hq = self.h[0] * q[0] + self.h[1] * q[1];
-        let g = L::splat(1.0) + he;
-        let side = L::splat(1.0) - hq;
+        let m = [d[0] + p[0] * self.defocus, d[1] + p[1] * self.defocus];
+        let side = L::splat(1.0) - (self.lens_slope[0] * p[0] + self.lens_slope[1] * p[1]);
+        let g = side + (self.h[0] * m[0] + self.h[1] * m[1]);
         let inside = Some((g * side).greater(self.edge_on));
-        let m0 = (e[0] + q[0]) + (q[0] * he - e[0] * hq);
-        let m1 = (e[1] + q[1]) + (q[1] * he - e[1] * hq);
-        let nu = self.a1 * m1;
-        let nv = self.b[0] * m0 + self.b[1] * m1;
+        let t = p[0] * m[1] - p[1] * m[0];
+        let n = [m[0] + self.lens_slope[1] * t, m[1] - self.lens_slope[0] * t];
+        let nu = self.a1 * n[1];
+        let nv = self.b[0] * n[0] + self.b[1] * n[1];
         let flipped = side.less(L::splat(0.0));
         self.hits::<PLAIN>(inside, nu, nv, g, self.depth * side, flipped, limits)
     }
@@ -170,7 +153,7 @@ impl<L: Lanes> LaneSplat<L> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use splat_core::evaluate::Hit;
+    use splat_core::evaluate::{Hit, LensPoint};
     use wide::f32x8;
 
     /// Numbers of every magnitude that set-up can make, both signs, and zero.
@@ -187,8 +170,9 @@ mod tests {
 
     fn constants() -> impl Strategy<Value = SplatConstants<f32>> {
         let pair = || [number(), number()];
-        (pair(), number(), pair(), prop_oneof![Just([0.0, 0.0]).boxed(), pair().boxed()], number(), pair())
-            .prop_map(|(h, a1, b, reference, depth, depth_slope)| SplatConstants {
+        let reference = prop_oneof![Just([0.0, 0.0]).boxed(), pair().boxed()];
+        (pair(), number(), pair(), reference, number(), pair(), number(), pair()).prop_map(
+            |(h, a1, b, reference, depth, depth_slope, defocus, lens_slope)| SplatConstants {
                 xi: 0,
                 yi: 0,
                 xf: 0.0,
@@ -199,10 +183,12 @@ mod tests {
                 reference,
                 centred: reference == [0.0, 0.0],
                 depth: depth.abs(),
-                inverse_depth: 1.0 / depth.abs().max(1e-9),
                 depth_slope,
+                defocus,
+                lens_slope,
                 edge_on: 1e-9,
-            })
+            },
+        )
     }
 
     /// Checks the lanes against the reference's hits, bit by bit.
@@ -228,7 +214,7 @@ mod tests {
             splat in constants(),
             x in proptest::array::uniform8(number()),
             y in proptest::array::uniform8(number()),
-            lens in [number(), number(), number(), number()],
+            lens in [number(), number()],
         ) {
             let limits = Limits { cutoff: 4.0, near: 1e-3, far: 1e6 };
             let lane_limits = LaneLimits::new(&limits);
@@ -239,10 +225,10 @@ mod tests {
             };
             check(&lane_splat.pinhole::<false>(d, &lane_limits), each(&|d| splat.pinhole(d, &limits)))?;
             check(&lane_splat.orthographic(d, &lane_limits), each(&|d| splat.orthographic(d, &limits)))?;
-            let point = LensPoint { p: [lens[0], lens[1]], p_over_focus: [lens[2], lens[3]] };
-            let lane_point = LaneLensPoint::splat(&point);
+            let point = LensPoint { p: lens };
+            let lane_point = [f32x8::splat(point.p[0]), f32x8::splat(point.p[1])];
             check(
-                &lane_splat.thin_lens::<false>(d, &lane_point, &lane_limits),
+                &lane_splat.thin_lens::<false>(d, lane_point, &lane_limits),
                 each(&|d| splat.thin_lens(d, &point, &limits)),
             )?;
         }

@@ -51,13 +51,14 @@ impl Kernel for RasterJob<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> u64 {
         // A copy of the loop for each form of the evaluation and each way to read the table: nothing is decided inside.
-        match (self.frame.rasterizer.form(), self.frame.rasterizer.table().quartic()) {
-            (Form::Pinhole, Some(table)) => self.rasterize::<L, _, PINHOLE>(table),
-            (Form::Pinhole, None) => self.rasterize::<L, _, PINHOLE>(self.frame.rasterizer.table()),
-            (Form::ThinLens, Some(table)) => self.rasterize::<L, _, THIN_LENS>(table),
-            (Form::ThinLens, None) => self.rasterize::<L, _, THIN_LENS>(self.frame.rasterizer.table()),
-            (Form::Orthographic, Some(table)) => self.rasterize::<L, _, ORTHOGRAPHIC>(table),
-            (Form::Orthographic, None) => self.rasterize::<L, _, ORTHOGRAPHIC>(self.frame.rasterizer.table()),
+        let table = self.frame.rasterizer.table();
+        match (self.frame.rasterizer.form(), table.quartic()) {
+            (Form::Pinhole, Some(polynomials)) => self.rasterize::<L, _, PINHOLE>(polynomials),
+            (Form::Pinhole, None) => self.rasterize::<L, _, PINHOLE>(table),
+            (Form::ThinLens, Some(polynomials)) => self.rasterize::<L, _, THIN_LENS>(polynomials),
+            (Form::ThinLens, None) => self.rasterize::<L, _, THIN_LENS>(table),
+            (Form::Orthographic, Some(polynomials)) => self.rasterize::<L, _, ORTHOGRAPHIC>(polynomials),
+            (Form::Orthographic, None) => self.rasterize::<L, _, ORTHOGRAPHIC>(table),
         }
     }
 }
@@ -202,7 +203,11 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         ];
         match FORM {
             PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
-            THIN_LENS => self.lane_splat.thin_lens::<PLAIN>(d, &self.samples.lens(cells), &self.limits),
+            THIN_LENS => {
+                let (a, b) = (self.samples.lens(first.0, first.1), self.samples.lens(second.0, second.1));
+                let p = [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])];
+                self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
+            }
             _ => self.lane_splat.orthographic(d, &self.limits),
         }
     }

@@ -211,7 +211,7 @@ impl Picture<'_> {
         let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
         records.clear(self.samples.groups(), if region.area() > 1 { limit } else { usize::MAX });
         let frame = self.raster_frame();
-        let tests = self.level.run(RasterJob { frame, ranks, region: *region, sink: records, places });
+        let tests = self.level.run(RasterJob { frame, ranks, region: *region, records, places });
         if !records.is_complete() {
             statistics.raster += start.elapsed();
             for quarter in quarters(region) {

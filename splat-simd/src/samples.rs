@@ -1,6 +1,6 @@
 //! The samples of a frame in the order in which lanes want them.
 
-use crate::evaluate::{LaneLensPoint, LaneLimits};
+use crate::evaluate::LaneLimits;
 use crate::lanes::{Eight, LANES, Lanes};
 use crate::places::{PLACES, pixel_of};
 use splat_core::raster::Rasterizer;
@@ -14,7 +14,7 @@ pub struct LaneSamples {
     groups: usize,
     samples: usize,
     jitter: Vec<[Eight; 2]>,
-    lens: Vec<[Eight; 4]>,
+    lens: Vec<[Eight; 2]>,
     /// For each place of a tile, where its cells begin in `jitter` and in `lens`.
     first: Box<[[u32; 2]; PLACES]>,
 }
@@ -39,13 +39,9 @@ impl LaneSamples {
         let with_lens = cells().filter(|&(pattern, _)| !samples.lens_of_pattern(pattern).is_empty());
         let lens = with_lens.map(|(pattern, group)| {
             let points = samples.lens_of_pattern(pattern);
-            let value = |value: usize, lane: usize| {
-                number(group, lane).map_or(0.0, |number| {
-                    let point = &points[number];
-                    [point.p[0], point.p[1], point.p_over_focus[0], point.p_over_focus[1]][value]
-                })
-            };
-            [0, 1, 2, 3].map(|number| std::array::from_fn(|lane| value(number, lane)))
+            [0, 1].map(|axis| {
+                std::array::from_fn(|lane| number(group, lane).map_or(0.0, |number| points[number].p[axis]))
+            })
         });
         let first = |place| {
             let [x, y] = pixel_of(place as u16);
@@ -78,22 +74,13 @@ impl LaneSamples {
     /// The cell of a place: positions relative to the pixel's corner.
     #[inline(always)]
     pub fn jitter(&self, place: u16, group: usize) -> &[Eight; 2] {
-        &self.jitter[self.first[usize::from(place)][0] as usize + group]
+        &self.jitter[self.first[usize::from(place) % PLACES][0] as usize + group]
     }
 
-    /// The lens points of two cells.
+    /// The lens points of the cell of a place, as [`splat_core::evaluate::LensPoint::p`].
     #[inline(always)]
-    pub fn lens<L: Lanes>(&self, [first, second]: [(u16, usize); 2]) -> LaneLensPoint<L> {
-        let (a, b) = (self.lens_points(first), self.lens_points(second));
-        LaneLensPoint {
-            p: [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])],
-            p_over_focus: [L::load_cells(&a[2], &b[2]), L::load_cells(&a[3], &b[3])],
-        }
-    }
-
-    #[inline(always)]
-    fn lens_points(&self, (place, group): (u16, usize)) -> &[Eight; 4] {
-        &self.lens[self.first[usize::from(place)][1] as usize + group]
+    pub fn lens(&self, place: u16, group: usize) -> &[Eight; 2] {
+        &self.lens[self.first[usize::from(place) % PLACES][1] as usize + group]
     }
 }
 

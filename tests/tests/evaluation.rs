@@ -75,7 +75,7 @@ impl Subject {
         }
     }
 
-    /// Whether the tests g > 0 and g (1 - h.q) > `edge_on` are within rounding of open.
+    /// Whether the tests g > 0 and g side > `edge_on` are within rounding of open.
     fn side_is_uncertain(&self, d: [f64; 2], unit: [f32; 2]) -> bool {
         let c = &self.exact;
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
@@ -89,12 +89,13 @@ impl Subject {
             return g.abs() <= tol::SIDE_ROUNDINGS * EPSILON * (1.0 + size(offset));
         };
         let point = LensPoint::<f64>::new(unit, lens, self.view.pixel_scale);
-        let e = [0, 1].map(|i| d[i] - point.p_over_focus[i]);
-        let q = point.p.map(|p| p * c.inverse_depth);
-        let (g, side) = (1.0 + dot(c.h, e), 1.0 - dot(c.h, q));
-        let reach = [0, 1].map(|i| offset[i] + point.p_over_focus[i].abs());
-        let g_error = tol::SIDE_ROUNDINGS * EPSILON * (1.0 + size(reach));
+        let shift = point.p.map(|p| p * c.defocus);
+        let q = point.p.map(|p| p / c.depth);
+        let side = 1.0 - dot(c.h, q);
+        let g = side + dot(c.h, [d[0] + shift[0], d[1] + shift[1]]);
         let side_error = tol::SIDE_ROUNDINGS * EPSILON * (1.0 + size(q));
+        let reach = [0, 1].map(|i| offset[i] + shift[i].abs());
+        let g_error = side_error + tol::SIDE_ROUNDINGS * EPSILON * size(reach);
         let product_error = g.abs() * side_error + side.abs() * g_error + g_error * side_error;
         (g * side - c.edge_on).abs() <= product_error + 2.0 * EPSILON * c.edge_on
     }
@@ -317,6 +318,10 @@ fn a_perturbed_constant_leaves_the_bound() {
         let worst = compare(&subject, &mut Random::new(3), 4000);
         assert!(worst.violation.is_some(), "an error of 64 roundings went unseen");
     }
+    let mut subject = Subject::new(&cloud, &hd_lens(0.1, 4.0), 4.0).expect("visible");
+    subject.rounded.defocus *= 1.0 + 64.0 * EPSILON as f32;
+    let worst = compare(&subject, &mut Random::new(3), 4000);
+    assert!(worst.violation.is_some(), "an error of 64 roundings of the defocus went unseen");
 }
 
 // ---------------------------------------------------------------------------------------------------------
@@ -411,7 +416,7 @@ fn most_random_splats_are_visible() {
 fn a_lens_in_pixels_is_its_unit_aperture_scaled() {
     let lens = Lens { radius: 0.25, focus: 2.0, blades: 0 };
     let point = LensPoint::<f64>::new([0.5, -1.0], lens, DVec2::new(100.0, 200.0));
-    assert_eq!((point.p, point.p_over_focus), ([12.5, -50.0], [6.25, -25.0]));
+    assert_eq!(point.p, [12.5, -50.0]);
     assert_eq!(
         hd_lens(0.25, 2.0).projection,
         Projection::Perspective { focal_length: DVec2::splat(FOCAL), lens: Some(lens) }

@@ -59,8 +59,8 @@ fn sensitivity(splat: &CameraSplat, view: &View, point: DVec3, unit: [f32; 2]) -
     norm / rows.determinant().abs() * size + view.cutoff.sqrt()
 }
 
-/// The lens form's own error, in roundings: q and e are far larger than the offset that they make together,
-/// which the problem's condition does not know.
+/// The lens form's own error, in roundings: for a lens hundreds of times as large as its distance from the splat's
+/// plane, side and the terms of n are that much larger than 1 and m, which the problem's condition does not know.
 fn form_error(c: &SplatConstants<f64>, view: &View, whole: DVec2, jitter: [f64; 2], unit: [f32; 2]) -> f64 {
     let Some(lens) = view.lens else { return 0.0 };
     let d = c.offset(whole.x as i32, whole.y as i32, jitter);

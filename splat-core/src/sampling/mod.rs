@@ -161,7 +161,7 @@ impl<R: Real> LensPoint<R> {
     /// The point `unit` of an aperture of radius 1, on this lens. Each value is rounded once.
     pub fn new(unit: [f32; 2], lens: Lens, pixel_scale: DVec2) -> Self {
         let p = [0, 1].map(|axis| f64::from(unit[axis]) * lens.radius * pixel_scale[axis]);
-        Self { p: p.map(R::from_f64), p_over_focus: p.map(|p| R::from_f64(p / lens.focus)) }
+        Self { p: p.map(R::from_f64) }
     }
 }
 
@@ -273,7 +273,6 @@ mod tests {
         let table = table(&options);
         for (unit, point) in table.unit_lens(5, 9).iter().zip(table.lens(5, 9)) {
             assert_eq!(point.p, [unit[0] * 50.0, unit[1] * 25.0]);
-            assert_eq!(point.p_over_focus, [unit[0] * 25.0, unit[1] * 12.5]);
         }
     }
 }

@@ -49,40 +49,54 @@ impl SplatConstants<f64> {
         let ed = offset_error(d, max_jitter);
         let g = 1.0 + dot(self.h, d);
         let g_error = dot_abs(self.h, ed) + 3.0 * EPSILON * dot_abs(self.h, d) + EPSILON * g.abs();
-        self.quotient_error(d, ed, g, g_error, self.depth, EPSILON * self.depth.abs())
+        let numerators = [self.a1 * d[1], dot(self.b, d)];
+        let errors = [
+            self.a1.abs() * ed[1] + 2.0 * EPSILON * numerators[0].abs(),
+            dot_abs(self.b, ed) + 3.0 * EPSILON * dot_abs(self.b, d),
+        ];
+        self.quotient_error(numerators, errors, g, g_error, self.depth, EPSILON * self.depth.abs())
     }
 
     /// The bound for a thin lens's sample at offset `d` (in pixels), seen through the point `lens`.
     pub fn thin_lens_error(&self, d: [f64; 2], max_jitter: f64, lens: &LensPoint<f64>) -> ErrorBound {
+        let (p, slope) = (lens.p, self.lens_slope);
         let ed = offset_error(d, max_jitter);
-        // e = d - p/focus, the quotient rounded once in the sample table.
-        let e = [0, 1].map(|i| d[i] - lens.p_over_focus[i]);
-        let ee = [0, 1].map(|i| ed[i] + EPSILON * (lens.p_over_focus[i].abs() + e[i].abs()));
-        // q = p * (1/depth): p, the reciprocal, the product.
-        let q = lens.p.map(|p| p * self.inverse_depth);
-        let eq = q.map(|q| 3.0 * EPSILON * q.abs());
-        let he = dot(self.h, e);
-        let he_error = dot_abs(self.h, ee) + 3.0 * EPSILON * dot_abs(self.h, e);
-        let hq = dot(self.h, q);
-        let hq_error = dot_abs(self.h, eq) + 3.0 * EPSILON * dot_abs(self.h, q);
-        let g = 1.0 + he;
-        let g_error = he_error + EPSILON * g.abs();
-        let side = 1.0 - hq;
-        let side_error = hq_error + EPSILON * side.abs();
-        // m = (e + q) + (q he - e hq): two products, their difference, the inner sum, the outer sum.
-        let m = [0, 1].map(|i| (e[i] + q[i]) + (q[i] * he - e[i] * hq));
-        let em = [0, 1].map(|i| {
-            let inputs = ee[i]
-                + eq[i]
-                + eq[i] * he.abs()
-                + q[i].abs() * he_error
-                + ee[i] * hq.abs()
-                + e[i].abs() * hq_error;
-            let products = (q[i] * he).abs() + (e[i] * hq).abs();
-            inputs + EPSILON * ((e[i] + q[i]).abs() + 2.0 * products + m[i].abs())
-        });
+        // m = d + p k: p, k, the product; the sum.
+        let shift = p.map(|p| p * self.defocus);
+        let m = [0, 1].map(|i| d[i] + shift[i]);
+        let em = [0, 1].map(|i| ed[i] + EPSILON * (3.0 * shift[i].abs() + m[i].abs()));
+        // side = 1 - H.p: H, p, the products, their sum; the difference.
+        let side = 1.0 - dot(slope, p);
+        let side_error = EPSILON * (4.0 * dot_abs(slope, p) + side.abs());
+        let g = side + dot(self.h, m);
+        let g_error =
+            side_error + dot_abs(self.h, em) + 3.0 * EPSILON * dot_abs(self.h, m) + EPSILON * g.abs();
+        let [numerators, errors] = self.lens_numerators(m, em, p);
         let scaled_error = self.depth.abs() * (side_error + 2.0 * EPSILON * side.abs());
-        self.quotient_error(m, em, g, g_error, self.depth * side, scaled_error)
+        self.quotient_error(numerators, errors, g, g_error, self.depth * side, scaled_error)
+    }
+
+    /// The numerators of (u, v) through the lens point `p`, and their errors, given m and its error.
+    ///
+    /// With n = m + (H1, -H0) t a numerator c.n is c.m + k t, where k = c0 H1 - c1 H0; and t = p0 m1 - p1 m0. So it
+    /// is linear in m, its slopes c0 - k p1 and c1 + k p0. Where a splat is steep c and H are large, but all but
+    /// parallel, and k is small.
+    fn lens_numerators(&self, m: [f64; 2], em: [f64; 2], p: [f64; 2]) -> [[f64; 2]; 2] {
+        let slope = self.lens_slope;
+        let t = p[0] * m[1] - p[1] * m[0];
+        // p and each product; the difference.
+        let et = EPSILON * (2.0 * dot_abs(p, [m[1], m[0]]) + t.abs());
+        let bend = [slope[1] * t, -slope[0] * t];
+        let n = [0, 1].map(|i| m[i] + bend[i]);
+        // H and the product; the sum.
+        let en = [0, 1].map(|i| EPSILON * (2.0 * bend[i].abs() + n[i].abs()));
+        let columns = [[0.0, self.a1], self.b];
+        let errors = columns.map(|c| {
+            let k = c[0] * slope[1] - c[1] * slope[0];
+            let from_m = dot_abs([c[0] - k * p[1], c[1] + k * p[0]], em);
+            from_m + k.abs() * et + dot_abs(c, en) + 3.0 * EPSILON * dot_abs(c, n)
+        });
+        [columns.map(|c| dot(c, n)), errors]
     }
 
     /// The bound for an orthographic camera's sample at offset `d` (in pixels).
@@ -98,21 +112,16 @@ impl SplatConstants<f64> {
         self.bound(position, [eu, ev], depth_error, cutoff)
     }
 
-    /// The common end of the perspective forms: (u, v) = reference + A m / g and depth = scaled_depth / g.
+    /// The common end of the perspective forms: (u, v) = reference + numerators / g and depth = scaled_depth / g.
     fn quotient_error(
         &self,
-        m: [f64; 2],
-        em: [f64; 2],
+        numerators: [f64; 2],
+        numerator_errors: [f64; 2],
         g: f64,
         g_error: f64,
         scaled_depth: f64,
         scaled_depth_error: f64,
     ) -> ErrorBound {
-        let numerators = [self.a1 * m[1], dot(self.b, m)];
-        let numerator_errors = [
-            self.a1.abs() * em[1] + 2.0 * EPSILON * numerators[0].abs(),
-            dot_abs(self.b, em) + 3.0 * EPSILON * dot_abs(self.b, m),
-        ];
         let from_reference = numerators.map(|numerator| numerator / g);
         let position = [0, 1].map(|i| self.reference[i] + from_reference[i]);
         let errors = [0, 1].map(|i| {

@@ -58,8 +58,10 @@ pub fn without_lens(
 /// The margin of a splat seen through a lens.
 ///
 /// A lens may reach through the splat's plane; a point of it that lies in the plane sees the splat edge-on, and near
-/// that point rounding decides. So a hit must have g (1 - h.q) above a threshold that keeps both factors well above
-/// their errors. A hit at depth w has g = (1 - h.q) wr/w, so g (1 - h.q) is g^2 w/wr and (1 - h.q)^2 wr/w.
+/// that point rounding decides. So a hit must have g side above a threshold that keeps both factors well above their
+/// errors. A hit at depth w has g = side wr/w, so g side is g^2 w/wr and side^2 wr/w.
+///
+/// `depth` and `reach` are those of a disc that holds every hit: of [`hit_radius`].
 pub fn with_lens(
     constants: &SplatConstants<f64>,
     depth: Extent,
@@ -68,33 +70,50 @@ pub fn with_lens(
     view: &View,
 ) -> Margin {
     let radius = view.cutoff.sqrt();
-    let [h, b] = [constants.h.map(f64::abs), constants.b.map(f64::abs)];
+    let [h, slope] = [constants.h.map(f64::abs), constants.lens_slope.map(f64::abs)];
     let dot = |p: [f64; 2], q: [f64; 2]| p[0] * q[0] + p[1] * q[1];
     let [g_min, g_max] = [constants.depth / depth.max, constants.depth / depth.min];
-    let q = lens_pixels.map(|p| p / constants.depth);
-    // A hit's e is d' - q wr/w, where d' is the offset at which a pinhole would see the same point of the splat.
-    let e = [0, 1].map(|i| reach.of_splat[i] + q[i] * g_max);
-    let d = [0, 1].map(|i| e[i] + reach.lens_over_focus[i]);
-    let ee = [0, 1]
-        .map(|i| EPSILON * (2.0 * d[i] + 2.0 * (view.max_jitter() + 1.0) + reach.lens_over_focus[i] + e[i]));
-    let eq = q.map(|q| 3.0 * EPSILON * q);
-    let [he, hq] = [dot(h, e), dot(h, q)];
-    let he_error = dot(h, ee) + 3.0 * EPSILON * he;
-    let hq_error = 6.0 * EPSILON * hq;
+    // What a pinhole sees at the offset d' a lens sees at d = d' + p (1/focus - 1/w), so m = d' + p (1/wr - 1/w).
+    let blur = view.circle_of_confusion(depth) * view.pixel_scale;
+    let inverse = 1.0 / constants.depth;
+    let spread = (1.0 / depth.min - inverse).abs().max((1.0 / depth.max - inverse).abs());
+    let m = [0, 1].map(|i| reach.of_splat[i] + lens_pixels[i] * spread);
     let em = [0, 1].map(|i| {
-        let inputs = ee[i] * (1.0 + hq) + eq[i] * (1.0 + he) + q[i] * he_error + e[i] * hq_error;
-        inputs + EPSILON * (2.0 * (e[i] + q[i]) + 3.0 * (q[i] * he + e[i] * hq))
+        let d = reach.of_splat[i] + blur[i];
+        let shift = lens_pixels[i] * constants.defocus.abs();
+        EPSILON * (2.0 * d + 2.0 * (view.max_jitter() + 1.0) + 3.0 * shift + m[i])
     });
-    let numerators = constants.a1.abs() * em[1] + dot(b, em);
-    let g_error = he_error + EPSILON * g_max * (1.0 + hq);
-    let side_error = hq_error + EPSILON * (1.0 + hq);
+    let hp = dot(slope, lens_pixels);
+    let side_error = EPSILON * (4.0 * hp + (1.0 + hp));
+    let g_error = side_error + dot(h, em) + EPSILON * (3.0 * dot(h, m) + g_max * (1.0 + hp));
+    let numerators = lens_numerators(constants, m, em, lens_pixels);
 
     let least_g = (numerators / NUMERATOR_ERROR).max(g_error / DENOMINATOR_ERROR);
     let least_side = side_error / DENOMINATOR_ERROR;
     let edge_on = (least_g * least_g / g_min).max(least_side * least_side * g_max);
     // Where the lens keeps clear of the plane, g has a lower bound without that.
     let usual = USUAL * radius;
-    let clear = (1.0 - hq) * g_min;
+    let clear = (1.0 - hp) * g_min;
     let certain = clear > 0.0 && numerators + 2.0 * radius * g_error < 0.5 * usual * clear;
-    Margin { radius: radius + if certain { usual } else { MAX_ERROR }, edge_on }
+    Margin { radius: if certain { radius + usual } else { hit_radius(radius) }, edge_on }
+}
+
+/// The radius, in sigma, within which every hit of a splat of `radius` lies that a lens's rounding can make.
+pub fn hit_radius(radius: f64) -> f64 {
+    radius + MAX_ERROR
+}
+
+/// The largest errors of the numerators of u and of v, added, given the largest |m|, its error and the largest |p|.
+fn lens_numerators(constants: &SplatConstants<f64>, m: [f64; 2], em: [f64; 2], p: [f64; 2]) -> f64 {
+    let slope = constants.lens_slope;
+    let t = p[0] * m[1] + p[1] * m[0];
+    let bend = [slope[1].abs() * t, slope[0].abs() * t];
+    // Three roundings of c.n and one of n's sum, all relative to n; two of the product.
+    let en = [0, 1].map(|i| EPSILON * (4.0 * (m[i] + bend[i]) + 2.0 * bend[i]));
+    let error = |c: [f64; 2]| {
+        let k = (c[0] * slope[1] - c[1] * slope[0]).abs();
+        let from_m = (c[0].abs() + k * p[1]) * em[0] + (c[1].abs() + k * p[0]) * em[1];
+        from_m + 3.0 * EPSILON * k * t + c[0].abs() * en[0] + c[1].abs() * en[1]
+    };
+    error([0.0, constants.a1]) + error(constants.b)
 }

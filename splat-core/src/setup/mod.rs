@@ -20,6 +20,7 @@ use crate::evaluate::SplatConstants;
 use crate::options::Shading;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
 use glam::{DVec3, Vec3, Vec3Swizzles};
+use margin::Margin;
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -68,6 +69,9 @@ pub struct VisibleSplat {
     pub back: bool,
     /// Whether its facing depends on where it is seen from: its normal tells the outside from the inside.
     pub flips: bool,
+    /// Whether in `bounds` the cutoff alone decides what is a hit: its centre is the reference point, near and far plane are
+    /// well away, and for a pinhole all samples lie well before the horizon of its plane (g > 0).
+    pub plain: bool,
     /// Its nearest depth, in camera units: the key of splat order.
     pub nearest: f64,
     /// What its fragments share.
@@ -139,15 +143,7 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
         return Outcome::Culled;
     }
     let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
-    let depth = view.depth_extent(&splat, radius);
-    let reach = view.reach(exact.pixel(), &screen);
-    let margin = match view.lens_pixels() {
-        Some(lens_pixels) => margin::with_lens(&exact, depth, &reach, lens_pixels, view),
-        None => match margin::without_lens(&exact, depth, &reach, view) {
-            Some(margin) => margin,
-            None => return Outcome::EdgeOn,
-        },
-    };
+    let Some(margin) = rounding_margin(&splat, &exact, &screen, view) else { return Outcome::EdgeOn };
     if margin.radius > usual {
         let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::EdgeOn };
         bounds = candidates(&splat, &screen, margin.radius, view);
@@ -169,9 +165,54 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
         weight_scale: weight_scale(cloud, index, options),
         back: splat.back,
         flips: cloud.oriented,
+        plain: is_plain(&exact, &bounds, view.depth_extent(&splat, hit_radius), view),
         nearest: splat.center.z - half_depth(&splat, radius),
         surface: surface(cloud, index, &splat, view, options),
     })
+}
+
+/// [`VisibleSplat::plain`].
+fn is_plain(constants: &SplatConstants<f64>, bounds: &PixelRect, depth: Extent, view: &View) -> bool {
+    if !constants.centred || view.orthographic {
+        return false;
+    }
+    let least;
+    let greatest;
+    if view.lens.is_some() {
+        // The depth of a hit lies in that of the splat, give or take the errors of g and 1 - h.q, 1/16 each.
+        [least, greatest] = [depth.min / 1.25, depth.max * 1.25];
+    } else {
+        // How far g can come from 1 in the candidates' pixels; with 1/16 to spare its rounding does not matter.
+        let room = view.max_jitter();
+        let center = constants.pixel();
+        let farthest = |center: f64, first: i32, end: i32| {
+            (f64::from(first) + 0.5 - room - center).abs().max((f64::from(end) - 0.5 + room - center).abs())
+        };
+        let slope = constants.h[0].abs() * farthest(center.x, bounds.x0, bounds.x1)
+            + constants.h[1].abs() * farthest(center.y, bounds.y0, bounds.y1);
+        if slope > 15.0 / 16.0 {
+            return false;
+        }
+        [least, greatest] = [constants.depth / 2.0, constants.depth * 17.0];
+    }
+    view.near < least && greatest < view.far
+}
+
+/// The margin that rounding needs; `screen` is the splat's usual box. `None` if it is seen edge-on.
+fn rounding_margin(
+    splat: &CameraSplat,
+    exact: &SplatConstants<f64>,
+    screen: &[Extent; 2],
+    view: &View,
+) -> Option<Margin> {
+    let radius = view.cutoff.sqrt();
+    let Some(lens_pixels) = view.lens_pixels() else {
+        let depth = view.depth_extent(splat, radius);
+        return margin::without_lens(exact, depth, &view.reach(exact.pixel(), screen), view);
+    };
+    let widest = margin::hit_radius(radius);
+    let reach = view.reach(exact.pixel(), &screen_box(splat, widest, view)?);
+    Some(margin::with_lens(exact, view.depth_extent(splat, widest), &reach, lens_pixels, view))
 }
 
 /// A splat of the cloud in camera space (L46-69). The camera's position is subtracted in `f64`.

@@ -70,8 +70,9 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
         reference: rotate(u, v),
         centred: deep.is_none(),
         depth: point.z,
-        inverse_depth: if view.orthographic { 0.0 } else { 1.0 / point.z },
         depth_slope,
+        defocus: view.lens.map_or(0.0, |lens| 1.0 / point.z - 1.0 / lens.focus),
+        lens_slope: view.lens.map_or([0.0; 2], |_| h.map(|h| h / point.z)),
         edge_on: 0.0,
     })
 }

@@ -110,16 +110,14 @@ impl View {
     /// How far samples may be from the projection of a splat's reference point, given the splat's box in pixels.
     pub(super) fn reach(&self, from: DVec2, screen: &[Extent; 2]) -> Reach {
         let room = self.filter_radius + 1.0;
-        let farthest = |axis: usize, min: f64, max: f64| {
-            (min - room - from[axis]).abs().max((max + room - from[axis]).abs())
-        };
+        let farthest =
+            |axis: usize, min: f64, max: f64| (min - from[axis]).abs().max((max - from[axis]).abs());
         let frame = self.frame.map(f64::from);
-        let lens = self.lens.map_or(DVec2::ZERO, |lens| lens.radius / lens.focus * self.pixel_scale);
         Reach {
             of_splat: [0, 1].map(|axis| farthest(axis, screen[axis].min, screen[axis].max)),
-            in_frame: [0, 1]
-                .map(|axis| farthest(axis, screen[axis].min.max(0.0), screen[axis].max.min(frame[axis]))),
-            lens_over_focus: lens.to_array(),
+            in_frame: [0, 1].map(|axis| {
+                farthest(axis, screen[axis].min.max(0.0) - room, screen[axis].max.min(frame[axis]) + room)
+            }),
         }
     }
 
@@ -143,6 +141,4 @@ pub(crate) struct Reach {
     pub of_splat: [f64; 2],
     /// Of samples in the frame that a pinhole's hit may have.
     pub in_frame: [f64; 2],
-    /// Radius of the lens over the focus: what a lens point shifts a sample by.
-    pub lens_over_focus: [f64; 2],
 }
