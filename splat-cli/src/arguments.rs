@@ -164,7 +164,7 @@ pub struct SplatArguments {
     #[arg(long, value_name = "F", value_parser = values::cutoff)]
     pub cutoff: Option<f64>,
     /// How the kernel's table is read
-    #[arg(long, value_name = "TABLE", default_value = "quartic8")]
+    #[arg(long, value_name = "TABLE", default_value = "poly8")]
     pub exp: TableChoice,
     /// How much of a sample a surface covers [default: opaque]
     #[arg(long, value_name = "COVERAGE")]

@@ -104,6 +104,8 @@ pub enum TableChoice {
     Lerp256,
     /// 8 polynomials of degree 4
     Quartic8,
+    /// 8 polynomials of the least degree that keeps the error below 1e-5
+    Poly8,
 }
 
 impl From<TableChoice> for TableMode {
@@ -113,6 +115,7 @@ impl From<TableChoice> for TableMode {
             TableChoice::Midpoint256 => Self::Midpoint256,
             TableChoice::Lerp256 => Self::Lerp256,
             TableChoice::Quartic8 => Self::Quartic8,
+            TableChoice::Poly8 => Self::Poly8,
         }
     }
 }
@@ -245,7 +248,7 @@ mod tests {
         assert_eq!(words::<FilterChoice>(), ["box", "tent", "gaussian", "blackman-harris"]);
         assert_eq!(words::<PatternChoice>(), ["poisson", "sobol"]);
         assert_eq!(words::<KernelChoice>(), ["gaussian", "windowed", "disc"]);
-        assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8"]);
+        assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8", "poly8"]);
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
         assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
         assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight"]);

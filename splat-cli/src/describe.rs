@@ -29,6 +29,7 @@ pub fn options(options: &RenderOptions) -> String {
         TableMode::Midpoint256 => "midpoint256",
         TableMode::Lerp256 => "lerp256",
         TableMode::Quartic8 => "quartic8",
+        TableMode::Poly8 => "poly8",
     };
     let resolve = match options.resolve {
         Resolve::Over => "over".to_owned(),

@@ -28,7 +28,7 @@ pub struct SplatConstants<R> {
     pub b: [R; 2],
     /// (u, v) of the reference point: (0, 0), or the deepest point of the splat.
     pub reference: [R; 2],
-    /// Whether the reference point is the centre, so that a division-free test will do.
+    /// Whether the reference point is the centre.
     pub centred: bool,
     /// Depth of the reference point, in camera units.
     pub depth: R,
@@ -137,17 +137,12 @@ impl<R: Real> SplatConstants<R> {
         flipped: bool,
         limits: &Limits<R>,
     ) -> Option<Hit<R>> {
-        // Without a division, while most candidates miss.
-        let inside = inside && (!self.centred || nu * nu + nv * nv < limits.cutoff * (g * g));
-        if !inside {
-            return None;
-        }
         let inverse_g = g.recip();
         let u = self.reference[0] + nu * inverse_g;
         let v = self.reference[1] + nv * inverse_g;
         let r2 = u * u + v * v;
         let depth = scaled_depth * inverse_g;
-        let inside = (self.centred || r2 < limits.cutoff) && depth > limits.near && depth < limits.far;
+        let inside = inside && r2 < limits.cutoff && depth > limits.near && depth < limits.far;
         inside.then_some(Hit { u, v, r2, depth, flipped })
     }
 }

@@ -47,12 +47,17 @@ pub enum TableMode {
     Midpoint256,
     /// 256 bins, interpolated linearly.
     Lerp256,
-    /// 8 bins, in each a polynomial of degree 4: more exact than the others, and small enough for a vector register.
+    /// 8 bins, in each a polynomial of degree 4: more exact than the others, and small enough for vector registers.
     Quartic8,
+    /// 8 bins, in each a polynomial of degree 2, 3 or 4: the least that keeps the error below 1e-5.
+    Poly8,
 }
 
-/// Number of bins of a [`TableMode::Quartic8`] table.
-pub const QUARTIC_BINS: usize = 8;
+/// Number of bins of a [`TableMode::Quartic8`] or [`TableMode::Poly8`] table.
+pub const POLYNOMIAL_BINS: usize = 8;
+
+/// Greatest degree of the polynomials.
+pub const MAX_DEGREE: usize = 4;
 
 /// Number of bins of a table over [0, F).
 pub const TABLE_BINS: usize = 256;
@@ -65,55 +70,89 @@ pub struct KernelTable {
     scale: f32,
     /// Value at the start of each bin (for `Midpoint256`, at its middle), and the step to the next.
     bins: Box<[[f32; 2]; TABLE_BINS]>,
-    quartic: Quartic,
+    polynomials: Option<Polynomials>,
 }
 
-/// A kernel over r2 in [0, F) as [`QUARTIC_BINS`] polynomials of degree 4.
+/// A kernel over r2 in [0, F) as a polynomial in each of [`POLYNOMIAL_BINS`] bins.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quartic {
-    /// Bins per unit of r2.
+pub struct Polynomials {
+    /// From r2 to x: bin i is [i, i + 1) of x. A little less than 8/F, so that x < 8 whatever the rounding.
     pub scale: f32,
-    /// For each power of the position within the bin, the coefficient in each bin.
-    pub coefficients: [[f32; QUARTIC_BINS]; 5],
+    /// Degree of the polynomials, at most [`MAX_DEGREE`].
+    pub degree: usize,
+    /// For each power of x, the coefficient in each bin; 0 beyond the degree.
+    pub coefficients: [[f32; POLYNOMIAL_BINS]; MAX_DEGREE + 1],
 }
 
-impl Quartic {
-    /// Each polynomial agrees with the kernel at the five Chebyshev points of its bin.
-    fn new(kernel: Kernel, cutoff: f64) -> Self {
-        let bin_width = cutoff / QUARTIC_BINS as f64;
-        let points: [f64; 5] =
-            std::array::from_fn(|i| 0.5 - 0.5 * libm::cos((2.0 * i as f64 + 1.0) * PI / 10.0));
-        let bins: [[f64; 5]; QUARTIC_BINS] = std::array::from_fn(|bin| {
-            interpolate(points, points.map(|t| kernel.value((bin as f64 + t) * bin_width, cutoff)))
+impl Polynomials {
+    /// What [`TableMode::Poly8`] keeps the error below; a tenth is left to rounding.
+    const LARGEST_ERROR: f64 = 0.9e-5;
+
+    fn new(kernel: Kernel, cutoff: f64, mode: TableMode) -> Option<Self> {
+        let degree = match mode {
+            TableMode::Quartic8 => MAX_DEGREE,
+            TableMode::Poly8 => (2..MAX_DEGREE)
+                .find(|&degree| Self::error_bound(kernel, cutoff, degree) < Self::LARGEST_ERROR)
+                .unwrap_or(MAX_DEGREE),
+            _ => return None,
+        };
+        let scale = (POLYNOMIAL_BINS as f64 / cutoff * (1.0 - 1.0 / f64::from(1 << 22))) as f32;
+        // Each polynomial agrees with the kernel at the Chebyshev points of its bin.
+        let count = degree + 1;
+        let bins: [Vec<f64>; POLYNOMIAL_BINS] = std::array::from_fn(|bin| {
+            let point = |i: usize| {
+                bin as f64 + 0.5 - 0.5 * libm::cos((2.0 * i as f64 + 1.0) * PI / (2.0 * count as f64))
+            };
+            let points: Vec<f64> = (0..count).map(point).collect();
+            let value = |x: &f64| kernel.value((x / f64::from(scale)).min(cutoff * (1.0 - f64::EPSILON)), cutoff);
+            let values = points.iter().map(value).collect();
+            interpolate(&points, values)
         });
-        let coefficients = std::array::from_fn(|power| bins.map(|bin| bin[power] as f32));
-        Self { scale: (QUARTIC_BINS as f64 / cutoff) as f32, coefficients }
+        let coefficient = |power: usize, bin: &Vec<f64>| bin.get(power).map_or(0.0, |&value| value as f32);
+        let coefficients = std::array::from_fn(|power| bins.each_ref().map(|bin| coefficient(power, bin)));
+        Some(Self { scale, degree, coefficients })
     }
 
-    /// The weight at r2 >= 0.
+    /// Interpolation at n Chebyshev points of a bin of width h errs by at most (h/2)^n max |f^(n)| / (2^(n-1) n!), and the
+    /// derivatives of exp(-r2/2) are at most 2^-n; the windowed kernel is it times 1 / (1 - exp(-F/2)) and a constant.
+    fn error_bound(kernel: Kernel, cutoff: f64, degree: usize) -> f64 {
+        let quarter = cutoff / POLYNOMIAL_BINS as f64 / 4.0;
+        let gain = match kernel {
+            Kernel::Gaussian => 1.0,
+            Kernel::Windowed => 1.0 / (1.0 - libm::exp(-0.5 * cutoff)),
+            Kernel::Disc => 0.0,
+        };
+        let n = degree as i32 + 1;
+        (1..=n).fold(2.0 * gain, |bound, i| bound * quarter / (2.0 * f64::from(i)))
+    }
+
+    /// The weight at r2 in [0, F).
     #[inline(always)]
     fn weight(&self, r2: f32) -> f32 {
-        let position = r2 * self.scale;
-        // By way of i32, whose conversion is the cheapest.
-        let bin = (position as i32).min(QUARTIC_BINS as i32 - 1) as usize;
-        let t = position - bin as f32;
-        let c = &self.coefficients;
-        (((c[4][bin] * t + c[3][bin]) * t + c[2][bin]) * t + c[1][bin]) * t + c[0][bin]
+        let x = r2 * self.scale;
+        // By way of i32, whose conversion is the cheapest. The remainder only matters for what is no hit.
+        let bin = x as i32 as usize % POLYNOMIAL_BINS;
+        let mut value = self.coefficients[self.degree % (MAX_DEGREE + 1)][bin];
+        for power in (0..self.degree).rev() {
+            value = value * x + self.coefficients[power][bin];
+        }
+        value
     }
 }
 
-/// The coefficients, by rising power, of the polynomial through five points (Newton's divided differences).
-fn interpolate(points: [f64; 5], values: [f64; 5]) -> [f64; 5] {
+/// The coefficients, by rising power, of the polynomial through some points (Newton's divided differences).
+fn interpolate(points: &[f64], values: Vec<f64>) -> Vec<f64> {
     let mut differences = values;
-    for order in 1..5 {
-        for i in (order..5).rev() {
+    let count = points.len();
+    for order in 1..count {
+        for i in (order..count).rev() {
             differences[i] = (differences[i] - differences[i - 1]) / (points[i] - points[i - order]);
         }
     }
-    // Horner's scheme over (t - points[i]), expanded.
-    let mut coefficients = [0.0; 5];
-    for i in (0..5).rev() {
-        for power in (1..5).rev() {
+    // Horner's scheme over (x - points[i]), expanded.
+    let mut coefficients = vec![0.0; count];
+    for i in (0..count).rev() {
+        for power in (1..count).rev() {
             coefficients[power] = coefficients[power - 1] - points[i] * coefficients[power];
         }
         coefficients[0] = differences[i] - points[i] * coefficients[0];
@@ -134,20 +173,20 @@ impl KernelTable {
             let step = if mode == TableMode::Lerp256 { value(bin + 1) - value(bin) } else { 0.0 };
             *entry = [value(bin) as f32, step as f32];
         }
-        let quartic = Quartic::new(kernel, cutoff);
-        Self { mode, scale: (TABLE_BINS as f64 / cutoff) as f32, bins, quartic }
+        let polynomials = Polynomials::new(kernel, cutoff, mode);
+        Self { mode, scale: (TABLE_BINS as f64 / cutoff) as f32, bins, polynomials }
     }
 
     /// The polynomials, where the table is read as such.
-    pub fn quartic(&self) -> Option<&Quartic> {
-        (self.mode == TableMode::Quartic8).then_some(&self.quartic)
+    pub fn polynomials(&self) -> Option<&Polynomials> {
+        self.polynomials.as_ref()
     }
 
-    /// The tabulated weight at r2 >= 0. The bin is clamped: rounding can carry r2 to F itself (erratum E17).
+    /// The tabulated weight at r2 in [0, F). The bin is clamped: rounding can carry it to its end (erratum E17).
     #[inline(always)]
     pub fn weight(&self, r2: f32) -> f32 {
-        if self.mode == TableMode::Quartic8 {
-            return self.quartic.weight(r2);
+        if let Some(polynomials) = &self.polynomials {
+            return polynomials.weight(r2);
         }
         let position = r2 * self.scale;
         let bin = (position as i32).min(TABLE_BINS as i32 - 1) as usize;
@@ -201,19 +240,26 @@ mod tests {
     }
 
     #[test]
-    fn the_quartic_is_exact_to_a_millionth() {
-        // Interpolation at n = 5 Chebyshev points of a bin of width h errs by at most (h/2)^5 |f^(5)| / (2^4 5!), and the
-        // fifth derivative of exp(-r2/2) is at most 1/32. Horner's scheme in f32 adds some 3e-7.
-        for (cutoff, bound) in [(2.0f64, 4e-7), (4.0, 4e-7), (9.0, 1.3e-6)] {
-            for kernel in [Kernel::Gaussian, Kernel::Windowed] {
-                let error = largest_error(kernel, cutoff, TableMode::Quartic8);
-                let half = cutoff / 16.0;
-                let exact = half * half * half * half * half / 32.0 / 1920.0;
-                let gain = kernel.value(0.0, cutoff) / (1.0 - libm::exp(-cutoff / 2.0));
-                assert!(bound >= exact * gain, "{cutoff}");
-                assert!(error <= bound, "{kernel:?} F={cutoff}: {error}");
+    fn polynomials_are_as_exact_as_their_bound() {
+        // Horner's scheme over x in [0, 8) rounds each of its sums, whose terms are about 1 in all: some 1e-6 at most.
+        let rounding = 1.2e-6;
+        for cutoff in [0.5, 2.0, 4.0, 9.0, 12.0] {
+            for kernel in KERNELS {
+                for mode in [TableMode::Quartic8, TableMode::Poly8] {
+                    let degree = KernelTable::new(kernel, cutoff, mode).polynomials.unwrap().degree;
+                    let bound = Polynomials::error_bound(kernel, cutoff, degree);
+                    let error = largest_error(kernel, cutoff, mode);
+                    println!("{kernel:?} F={cutoff} {mode:?} degree {degree}: {error:.2e}, bound {bound:.2e}");
+                    assert!(error <= bound + rounding, "{kernel:?} F={cutoff} {mode:?}: {error}");
+                    // No looser than need be: the next lower degree would not do.
+                    if mode == TableMode::Poly8 {
+                        assert!(cutoff > 9.0 || error < 1e-5, "{kernel:?} F={cutoff}: {error}");
+                        let lower = Polynomials::error_bound(kernel, cutoff, degree - 1);
+                        assert!(degree == 2 || lower >= Polynomials::LARGEST_ERROR);
+                    }
+                }
             }
-            assert_eq!(largest_error(Kernel::Disc, cutoff, TableMode::Quartic8), 0.0);
+            assert_eq!(largest_error(Kernel::Disc, cutoff, TableMode::Poly8), 0.0);
         }
     }
 
@@ -234,8 +280,13 @@ mod tests {
     #[test]
     fn the_bin_is_clamped_at_the_rim() {
         for kernel in KERNELS {
-            for mode in [TableMode::Floor256, TableMode::Midpoint256, TableMode::Lerp256, TableMode::Quartic8]
-            {
+            for mode in [
+                TableMode::Floor256,
+                TableMode::Midpoint256,
+                TableMode::Lerp256,
+                TableMode::Quartic8,
+                TableMode::Poly8,
+            ] {
                 let table = KernelTable::new(kernel, 3.0, mode);
                 for r2 in [3.0, 3.0f32.next_up(), 1e30] {
                     assert!(!table.weight(r2).is_nan(), "{kernel:?} {mode:?} {r2}");

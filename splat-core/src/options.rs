@@ -66,7 +66,7 @@ impl Default for RenderOptions {
             seed: 0,
             kernel: Kernel::Windowed,
             cutoff: 4.0,
-            table: TableMode::Quartic8,
+            table: TableMode::Poly8,
             resolve: Resolve::Surface { coverage: Coverage::Opaque, thickness: Thickness::AroundHit },
             thickness: 0.5,
             cull: false,

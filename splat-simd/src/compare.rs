@@ -65,7 +65,7 @@ impl<'a> SplatBySplat<'a> {
             surfaces: &self.surfaces,
             filter_radius: self.frame.view.filter_radius as f32,
         };
-        self.records.clear(groups, usize::MAX);
+        self.records.clear(groups, false, usize::MAX);
         let tests = self.level.run(RasterJob {
             frame,
             ranks: &[rank as u32],
@@ -75,7 +75,7 @@ impl<'a> SplatBySplat<'a> {
         });
         self.records.group();
         for cell in 0..PLACES * groups {
-            let entries = self.records.cell(cell);
+            let [entries, _] = self.records.cell(cell);
             let [column, row] = pixel_of((cell / groups) as u16);
             for lane in (0..LANES).filter(|_| !entries.is_empty()) {
                 let sample = first + cell % groups * LANES + lane;

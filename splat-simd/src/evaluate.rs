@@ -11,7 +11,6 @@ pub struct LaneSplat<L> {
     a1: L,
     b: [L; 2],
     reference: [L; 2],
-    centred: bool,
     depth: L,
     depth_slope: [L; 2],
     defocus: L,
@@ -30,8 +29,8 @@ pub struct LaneLimits<L> {
 /// Hits of several samples: lanes without a hit hold arbitrary values.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneHits<L> {
-    /// Set where the lane is hit.
-    pub mask: L,
+    /// Set where the lane is not hit.
+    pub missed: L,
     /// Set where the lane's lens point is on the other side of the splat's plane than the eye.
     pub flipped: L,
     /// u^2 + v^2.
@@ -63,7 +62,6 @@ impl<L: Lanes> LaneSplat<L> {
             a1: L::splat(constants.a1),
             b: pair(constants.b),
             reference: pair(constants.reference),
-            centred: constants.centred,
             depth: L::splat(constants.depth),
             depth_slope: pair(constants.depth_slope),
             defocus: L::splat(constants.defocus),
@@ -77,10 +75,10 @@ impl<L: Lanes> LaneSplat<L> {
     #[inline(always)]
     pub fn pinhole<const PLAIN: bool>(&self, d: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
         let g = L::splat(1.0) + (self.h[0] * d[0] + self.h[1] * d[1]);
-        let inside = if PLAIN { None } else { Some(g.greater(L::splat(0.0))) };
+        let outside = if PLAIN { None } else { Some(L::splat(0.0).not_less(g)) };
         let nu = self.a1 * d[1];
         let nv = self.b[0] * d[0] + self.b[1] * d[1];
-        self.hits::<PLAIN>(inside, nu, nv, g, self.depth, L::splat(0.0), limits)
+        self.hits::<PLAIN>(outside, nu, nv, g, self.depth, L::splat(0.0), limits)
     }
 
     /// [`SplatConstants::thin_lens`] for a sample and a lens point `p` a lane.
@@ -94,13 +92,13 @@ impl<L: Lanes> LaneSplat<L> {
         let m = [d[0] + p[0] * self.defocus, d[1] + p[1] * self.defocus];
         let side = L::splat(1.0) - (self.lens_slope[0] * p[0] + self.lens_slope[1] * p[1]);
         let g = side + (self.h[0] * m[0] + self.h[1] * m[1]);
-        let inside = Some((g * side).greater(self.edge_on));
+        let outside = Some(self.edge_on.not_less(g * side));
         let t = p[0] * m[1] - p[1] * m[0];
         let n = [m[0] + self.lens_slope[1] * t, m[1] - self.lens_slope[0] * t];
         let nu = self.a1 * n[1];
         let nv = self.b[0] * n[0] + self.b[1] * n[1];
         let flipped = side.less(L::splat(0.0));
-        self.hits::<PLAIN>(inside, nu, nv, g, self.depth * side, flipped, limits)
+        self.hits::<PLAIN>(outside, nu, nv, g, self.depth * side, flipped, limits)
     }
 
     /// [`SplatConstants::orthographic`] for a sample a lane.
@@ -110,8 +108,10 @@ impl<L: Lanes> LaneSplat<L> {
         let v = self.reference[1] + (self.b[0] * d[0] + self.b[1] * d[1]);
         let r2 = u * u + v * v;
         let depth = self.depth + (self.depth_slope[0] * u + self.depth_slope[1] * v);
-        let inside = r2.less(limits.cutoff) & depth.greater(limits.near) & depth.less(limits.far);
-        LaneHits { mask: inside, flipped: L::splat(0.0), r2, depth }
+        let missed = r2.not_less(limits.cutoff)
+            | limits.near.not_less(depth)
+            | depth.not_less(limits.far);
+        LaneHits { missed, flipped: L::splat(0.0), r2, depth }
     }
 
     /// The common end of the perspective forms.
@@ -119,7 +119,7 @@ impl<L: Lanes> LaneSplat<L> {
     #[expect(clippy::too_many_arguments, reason = "the seven quantities of one formula, inlined twice")]
     fn hits<const PLAIN: bool>(
         &self,
-        inside: Option<L>,
+        outside: Option<L>,
         nu: L,
         nv: L,
         g: L,
@@ -135,17 +135,14 @@ impl<L: Lanes> LaneSplat<L> {
         }
         let r2 = u * u + v * v;
         let depth = scaled_depth * inverse_g;
-        let mut mask = if PLAIN {
-            (nu * nu + nv * nv).less(limits.cutoff * (g * g))
-        } else {
-            let centred = (nu * nu + nv * nv).less(limits.cutoff * (g * g));
-            let on_splat = if self.centred { centred } else { r2.less(limits.cutoff) };
-            on_splat & depth.greater(limits.near) & depth.less(limits.far)
-        };
-        if let Some(inside) = inside {
-            mask = mask & inside;
+        let mut missed = r2.not_less(limits.cutoff);
+        if !PLAIN {
+            missed = missed | limits.near.not_less(depth) | depth.not_less(limits.far);
         }
-        LaneHits { mask, flipped, r2, depth }
+        if let Some(outside) = outside {
+            missed = missed | outside;
+        }
+        LaneHits { missed, flipped, r2, depth }
     }
 }
 
@@ -196,7 +193,7 @@ mod tests {
         let (r2, depth) = (lanes.r2.to_array(), lanes.depth.to_array());
         for (lane, hit) in scalar.into_iter().enumerate() {
             let bit = |mask: f32x8| mask.bits() >> lane & 1 == 1;
-            prop_assert_eq!(bit(lanes.mask), hit.is_some());
+            prop_assert_eq!(bit(lanes.missed), hit.is_none());
             if let Some(hit) = hit {
                 prop_assert_eq!(r2[lane].to_bits(), hit.r2.to_bits());
                 prop_assert_eq!(depth[lane].to_bits(), hit.depth.to_bits());

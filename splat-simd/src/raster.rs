@@ -7,7 +7,7 @@ use crate::records::{Hits, Page, RecordBuffer};
 use crate::samples::{LaneSamples, limits};
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
-use splat_core::kernel::{KernelTable, QUARTIC_BINS, Quartic};
+use splat_core::kernel::{KernelTable, Polynomials};
 use splat_core::raster::{Form, Rasterizer};
 use splat_core::setup::VisibleSplat;
 
@@ -52,13 +52,13 @@ impl Kernel for RasterJob<'_> {
     fn run<L: Lanes>(self) -> u64 {
         // A copy of the loop for each form of the evaluation and each way to read the table: nothing is decided inside.
         let table = self.frame.rasterizer.table();
-        match (self.frame.rasterizer.form(), table.quartic()) {
-            (Form::Pinhole, Some(polynomials)) => self.rasterize::<L, _, PINHOLE>(polynomials),
-            (Form::Pinhole, None) => self.rasterize::<L, _, PINHOLE>(table),
-            (Form::ThinLens, Some(polynomials)) => self.rasterize::<L, _, THIN_LENS>(polynomials),
-            (Form::ThinLens, None) => self.rasterize::<L, _, THIN_LENS>(table),
-            (Form::Orthographic, Some(polynomials)) => self.rasterize::<L, _, ORTHOGRAPHIC>(polynomials),
-            (Form::Orthographic, None) => self.rasterize::<L, _, ORTHOGRAPHIC>(table),
+        match table.polynomials() {
+            None => self.with_table::<L, _>(table),
+            Some(polynomials) => match polynomials.degree {
+                2 => self.with_table::<L, _>(&OfDegree::<2>(polynomials)),
+                3 => self.with_table::<L, _>(&OfDegree::<3>(polynomials)),
+                _ => self.with_table::<L, _>(&OfDegree::<4>(polynomials)),
+            },
         }
     }
 }
@@ -69,6 +69,15 @@ const THIN_LENS: u8 = 1;
 const ORTHOGRAPHIC: u8 = 2;
 
 impl RasterJob<'_> {
+    #[inline(always)]
+    fn with_table<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
+        match self.frame.rasterizer.form() {
+            Form::Pinhole => self.rasterize::<L, T, PINHOLE>(table),
+            Form::ThinLens => self.rasterize::<L, T, THIN_LENS>(table),
+            Form::Orthographic => self.rasterize::<L, T, ORTHOGRAPHIC>(table),
+        }
+    }
+
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable, const FORM: u8>(self, table: &T) -> u64 {
         let Self { frame, ranks, region, records, places } = self;
@@ -105,7 +114,8 @@ struct Evaluation<'a, L, T> {
     culls: bool,
     lane_splat: LaneSplat<L>,
     limits: LaneLimits<L>,
-    fraction: [L; 2],
+    /// Added: that can come from memory.
+    minus_fraction: [L; 2],
     weight_scale: L,
 }
 
@@ -119,7 +129,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
             culls: frame.rasterizer.culls(),
             lane_splat: LaneSplat::new(&splat.constants),
             limits: limits(frame.rasterizer),
-            fraction: [L::splat(splat.constants.xf), L::splat(splat.constants.yf)],
+            minus_fraction: [L::splat(-splat.constants.xf), L::splat(-splat.constants.yf)],
             weight_scale: L::splat(splat.weight_scale),
         }
     }
@@ -165,24 +175,25 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         page: &mut Page<'_>,
     ) {
         let hits = self.evaluate::<FORM, PLAIN>(list, cells);
-        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.mask);
-        let hit = hits.mask & weight.greater(L::splat(0.0));
+        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.missed);
+        let missed = hits.missed | L::splat(0.0).not_less(weight);
         let numbers = [
             usize::from(cells[0].0) * groups + cells[0].1,
             usize::from(cells[1].0) * groups + cells[1].1,
         ];
         let (back, depth) = (self.splat.back, hits.depth);
         if FORM != THIN_LENS {
-            put::<L, BOTH>(page, numbers, back, &Hits { hit, depth, weight });
+            put::<L, BOTH>(page, numbers, back, &Hits { missed, depth, weight });
             return;
         }
         // A lens may see both sides.
-        let flipped = if self.splat.flips { hits.flipped & hit } else { L::splat(0.0) };
+        let flipped = if self.splat.flips { hits.flipped.and_not(missed) } else { L::splat(0.0) };
         if flipped.bits() != 0 && !(self.culls && !back) {
-            put::<L, BOTH>(page, numbers, !back, &Hits { hit: flipped, depth, weight });
+            let missed = L::splat(0.0).or_not(flipped);
+            put::<L, BOTH>(page, numbers, !back, &Hits { missed, depth, weight });
         }
         if !(self.culls && back) {
-            put::<L, BOTH>(page, numbers, back, &Hits { hit: hit.and_not(flipped), depth, weight });
+            put::<L, BOTH>(page, numbers, back, &Hits { missed: missed | flipped, depth, weight });
         }
     }
 
@@ -194,8 +205,8 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
             (self.samples.jitter(first.0, first.1), self.samples.jitter(second.0, second.1));
         let (offset_a, offset_b) = (list.offset(first.0), list.offset(second.0));
         let jitter = [
-            L::load_cells(&jitter_a[0], &jitter_b[0]) - self.fraction[0],
-            L::load_cells(&jitter_a[1], &jitter_b[1]) - self.fraction[1],
+            L::load_cells(&jitter_a[0], &jitter_b[0]) + self.minus_fraction[0],
+            L::load_cells(&jitter_a[1], &jitter_b[1]) + self.minus_fraction[1],
         ];
         let d = [
             L::splat_cells(offset_a[0], offset_b[0]) + jitter[0],
@@ -224,33 +235,38 @@ fn put<L: Lanes, const BOTH: bool>(page: &mut Page<'_>, cells: [usize; 2], back:
 
 /// A table of the kernel that lanes can read.
 trait LaneTable {
-    /// [`KernelTable::weight`] for a sample a lane; arbitrary where `mask` is not set.
-    fn kernel<L: Lanes>(&self, r2: L, mask: L) -> L;
+    /// [`KernelTable::weight`] for a sample a lane; arbitrary where `missed` is set.
+    fn kernel<L: Lanes>(&self, r2: L, missed: L) -> L;
 }
 
-impl LaneTable for Quartic {
+/// Polynomials of this degree.
+struct OfDegree<'a, const DEGREE: usize>(&'a Polynomials);
+
+impl<const DEGREE: usize> LaneTable for OfDegree<'_, DEGREE> {
     #[inline(always)]
     fn kernel<L: Lanes>(&self, r2: L, _: L) -> L {
-        let position = r2 * L::splat(self.scale);
-        let bin = position.least(L::splat((QUARTIC_BINS - 1) as f32)).round_down();
-        let t = position - bin;
-        let [c0, c1, c2, c3, c4] = &self.coefficients;
-        let high = (bin.look_up(c4) * t + bin.look_up(c3)) * t + bin.look_up(c2);
-        (high * t + bin.look_up(c1)) * t + bin.look_up(c0)
+        let x = r2 * L::splat(self.0.scale);
+        let bin = x.to_index();
+        let coefficients = &self.0.coefficients;
+        let mut value = L::look_up(&coefficients[DEGREE], bin);
+        for power in (0..DEGREE).rev() {
+            value = value * x + L::look_up(&coefficients[power], bin);
+        }
+        value
     }
 }
 
 impl LaneTable for KernelTable {
     #[inline(always)]
-    fn kernel<L: Lanes>(&self, r2: L, mask: L) -> L {
+    fn kernel<L: Lanes>(&self, r2: L, missed: L) -> L {
         let mut values = [[0.0; LANES]; 2];
         r2.store_cell::<0>(&mut values[0]);
         if L::CELLS == 2 {
             r2.store_cell::<1>(&mut values[1]);
         }
-        let bits = mask.bits();
+        let misses = missed.bits();
         for (lane, value) in values.as_flattened_mut().iter_mut().enumerate().take(LANES * L::CELLS) {
-            *value = if bits >> lane & 1 == 1 { self.weight(*value) } else { 0.0 };
+            *value = if misses >> lane & 1 == 0 { self.weight(*value) } else { 0.0 };
         }
         L::load_cells(&values[0], &values[1])
     }

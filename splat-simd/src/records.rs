@@ -16,10 +16,10 @@ pub struct Record {
     pub weight: Eight,
 }
 
-/// The cell that a record belongs to, and its splat.
+/// The list that a record belongs to, and its splat.
 #[derive(Debug, Clone, Copy, Default)]
 struct Key {
-    cell: u32,
+    list: u32,
     splat: LocalSplat,
 }
 
@@ -66,7 +66,9 @@ pub struct RecordBuffer {
     /// The splats of the region: their ranks, and what their fragments share.
     ranks: Vec<u32>,
     surfaces: Vec<SplatSurface>,
-    /// For each cell the number of its records, then, grouped, where its entries end.
+    /// Number of lists a cell: one, or one for fronts and one for backs.
+    sides: usize,
+    /// For each list of each cell the number of its records, then, grouped, where its entries end.
     ends: Vec<u32>,
     entries: Vec<Entry>,
     /// The buffer takes no new splat when it holds more records than this.
@@ -79,8 +81,8 @@ pub struct RecordBuffer {
 /// The fragments of a splat in one cell, or two.
 #[derive(Debug, Clone, Copy)]
 pub struct Hits<L> {
-    /// The lanes that are hit, as a mask.
-    pub hit: L,
+    /// Set where the lane is not hit.
+    pub missed: L,
     /// View depths; arbitrary where there is no hit.
     pub depth: L,
     /// Weights; arbitrary where there is no hit.
@@ -92,15 +94,16 @@ impl RecordBuffer {
     pub const BYTES_PER_RECORD: usize = size_of::<Record>() + size_of::<Key>() + size_of::<Entry>();
 
     /// Empties the buffer, for a region of pixels of `groups` cells. It will take splats until it holds more than `limit`
-    /// records.
-    pub fn clear(&mut self, groups: usize, limit: usize) {
+    /// records, and keep fronts and backs apart if `two_sided`.
+    pub fn clear(&mut self, groups: usize, two_sided: bool, limit: usize) {
+        self.sides = 1 + usize::from(two_sided);
         self.limit = limit;
         self.complete = true;
         self.count = 0;
         self.ranks.clear();
         self.surfaces.clear();
         self.ends.clear();
-        self.ends.resize(PLACES * groups, 0);
+        self.ends.resize(PLACES * groups * self.sides, 0);
         self.fragments = 0;
     }
 
@@ -122,9 +125,10 @@ impl RecordBuffer {
         self.surfaces.push(*surface);
         Some(Page {
             number: self.ranks.len() as u32 - 1,
+            sides: self.sides,
             keys: &mut self.keys[..self.records.len()],
             records: &mut self.records,
-            cell_counts: &mut self.ends,
+            list_counts: &mut self.ends,
             count: self.count,
             fragments: self.fragments,
             totals: (&mut self.count, &mut self.fragments),
@@ -136,7 +140,7 @@ impl RecordBuffer {
         self.complete
     }
 
-    /// Groups the records by cell; within one they stay in splat order (a stable counting sort).
+    /// Groups the records by cell and side; within one they stay in splat order (a stable counting sort).
     pub fn group(&mut self) {
         let mut start = 0;
         for end in &mut self.ends {
@@ -146,23 +150,32 @@ impl RecordBuffer {
             self.entries.resize(self.records.len(), Entry::default());
         }
         for (number, key) in self.keys[..self.count].iter().enumerate() {
-            let position = &mut self.ends[key.cell as usize];
+            let position = &mut self.ends[key.list as usize];
             self.entries[*position as usize] = Entry { record: number as u32, splat: key.splat };
             *position += 1;
         }
     }
 
-    /// The entries of a cell, in splat order, after [`RecordBuffer::group`].
+    /// The entries of a cell, each side in splat order, after [`RecordBuffer::group`]: fronts and backs, or all and none.
     #[inline(always)]
-    pub fn cell(&self, cell: usize) -> &[Entry] {
-        self.cells(cell..cell + 1)
+    pub fn cell(&self, cell: usize) -> [&[Entry]; 2] {
+        if self.sides == 1 {
+            [self.list(cell..cell + 1), &[]]
+        } else {
+            [self.list(2 * cell..2 * cell + 1), self.list(2 * cell + 1..2 * cell + 2)]
+        }
     }
 
-    /// The entries of several cells.
+    /// Whether some cells have no entries.
     #[inline(always)]
-    pub fn cells(&self, cells: Range<usize>) -> &[Entry] {
-        let start = if cells.start == 0 { 0 } else { self.ends[cells.start - 1] };
-        &self.entries[start as usize..self.ends[cells.end - 1] as usize]
+    pub fn are_empty(&self, cells: Range<usize>) -> bool {
+        self.list(cells.start * self.sides..cells.end * self.sides).is_empty()
+    }
+
+    #[inline(always)]
+    fn list(&self, lists: Range<usize>) -> &[Entry] {
+        let start = if lists.start == 0 { 0 } else { self.ends[lists.start - 1] };
+        &self.entries[start as usize..self.ends[lists.end - 1] as usize]
     }
 
     /// The record of an entry.
@@ -191,8 +204,9 @@ impl RecordBuffer {
 pub struct Page<'a> {
     records: &'a mut [Record],
     keys: &'a mut [Key],
-    cell_counts: &'a mut [u32],
+    list_counts: &'a mut [u32],
     number: u32,
+    sides: usize,
     count: usize,
     fragments: u64,
     /// The buffer's own counts, brought up to date by [`Page::close`].
@@ -203,16 +217,17 @@ impl Page<'_> {
     /// Takes the hits of a cell: `CELL` of the lanes.
     #[inline(always)]
     pub fn put<L: Lanes, const CELL: usize>(&mut self, cell: usize, back: bool, hits: &Hits<L>) {
-        let bits = hits.hit.bits() >> (CELL * LANES) & u32::from(u8::MAX);
+        let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
         // Written in any case, but kept only if something was hit: a branch would be mispredicted at every rim.
         let record = &mut self.records[self.count];
-        hits.depth.or_not(hits.hit).store_cell::<CELL>(&mut record.depth);
-        (hits.hit & hits.weight).store_cell::<CELL>(&mut record.weight);
-        self.keys[self.count] = Key { cell: cell as u32, splat: LocalSplat::new(self.number, back) };
-        let kept = u32::from(bits != 0);
-        self.cell_counts[cell] += kept;
+        (hits.depth | hits.missed).store_cell::<CELL>(&mut record.depth);
+        hits.weight.and_not(hits.missed).store_cell::<CELL>(&mut record.weight);
+        let list = if self.sides == 1 { cell } else { 2 * cell + usize::from(back) };
+        self.keys[self.count] = Key { list: list as u32, splat: LocalSplat::new(self.number, back) };
+        let kept = u32::from(misses != u8::MAX);
+        self.list_counts[list] += kept;
         self.count += kept as usize;
-        self.fragments += u64::from(bits.count_ones());
+        self.fragments += u64::from(misses.count_zeros());
     }
 
     /// Ends the splat.

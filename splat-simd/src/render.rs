@@ -209,7 +209,8 @@ impl Picture<'_> {
         let start = Instant::now();
         let Worker { records, places, .. } = worker;
         let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
-        records.clear(self.samples.groups(), if region.area() > 1 { limit } else { usize::MAX });
+        let limit = if region.area() > 1 { limit } else { usize::MAX };
+        records.clear(self.samples.groups(), self.two_sided(), limit);
         let frame = self.raster_frame();
         let tests = self.level.run(RasterJob { frame, ranks, region: *region, records, places });
         if !records.is_complete() {
@@ -231,6 +232,11 @@ impl Picture<'_> {
             _ => self.resolve_each(worker, region, pixels, film),
         }
         statistics.resolve += start.elapsed();
+    }
+
+    /// Whether both sides of a splat can be seen, and are not the same.
+    fn two_sided(&self) -> bool {
+        self.cloud.oriented && !self.options.cull
     }
 
     fn raster_frame(&self) -> RasterFrame<'_> {
@@ -257,7 +263,6 @@ impl Picture<'_> {
             buffer: &worker.records,
             samples: &self.samples,
             coverage,
-            two_sided: self.cloud.oriented && !self.options.cull,
             opaque: self.cloud.opacities.is_none(),
             pixels,
             film,
@@ -285,7 +290,7 @@ impl Picture<'_> {
                     let cell = records.cell(first + number / LANES);
                     fragments.clear();
                     fragments
-                        .extend(cell.iter().filter_map(|&entry| records.fragment(entry, number % LANES)));
+                        .extend(cell.into_iter().flatten().filter_map(|&entry| records.fragment(entry, number % LANES)));
                     let place = SamplePlace { x, y, sample };
                     pixels.add(place, fragments, self.frame.rasterizer.samples());
                 }

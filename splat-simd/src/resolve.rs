@@ -22,8 +22,6 @@ pub struct ResolveJob<'a, 'b> {
     pub samples: &'a LaneSamples,
     /// How much of a sample a surface covers.
     pub coverage: Coverage,
-    /// Whether backs are drawn, and told from fronts.
-    pub two_sided: bool,
     /// Whether every splat is opaque.
     pub opaque: bool,
     /// Makes pixels of samples.
@@ -37,32 +35,26 @@ impl Kernel for ResolveJob<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        match (self.two_sided, self.opaque) {
-            (false, false) => self.resolve::<L, false, false>(),
-            (false, true) => self.resolve::<L, false, true>(),
-            (true, false) => self.resolve::<L, true, false>(),
-            (true, true) => self.resolve::<L, true, true>(),
-        }
+        if self.opaque { self.resolve::<L, true>() } else { self.resolve::<L, false>() }
     }
 }
 
 impl ResolveJob<'_, '_> {
     #[inline(always)]
-    fn resolve<L: Lanes, const TWO_SIDED: bool, const OPAQUE: bool>(self) {
+    fn resolve<L: Lanes, const OPAQUE: bool>(self) {
         let groups = self.samples.groups();
         for y in self.region.y0..self.region.y1 {
             for x in self.region.x0..self.region.x1 {
                 let cell = usize::from(place_of(x, y)) * groups;
-                if self.buffer.cells(cell..cell + groups).is_empty() {
+                if self.buffer.are_empty(cell..cell + groups) {
                     continue;
                 }
                 self.pixels.start();
                 for group in 0..groups {
-                    let resolver = CellResolver::<L, TWO_SIDED, OPAQUE> {
-                        entries: self.buffer.cell(cell + group),
+                    let resolver = CellResolver::<L, OPAQUE> {
+                        remaining: self.buffer.cell(cell + group),
                         buffer: self.buffer,
                         coverage: self.coverage,
-                        done: [L::splat(f32::NAN); 2],
                         colors: Colors::nothing(),
                     };
                     resolver.resolve().add_to(self.pixels, self.samples.samples_of(group));
@@ -102,9 +94,9 @@ impl<L: Lanes> Colors<L> {
         }));
     }
 
-    /// Lays a layer behind what is there, in the lanes of `valid`.
+    /// Lays a layer behind what is there, where its weight is enough.
     #[inline(always)]
-    fn composite<const OPAQUE: bool>(&mut self, sums: &Sums<L>, coverage: Coverage, valid: L) {
+    fn composite<const OPAQUE: bool>(&mut self, sums: &Sums<L>, coverage: Coverage) {
         let one = L::splat(1.0);
         let [least, covered] = match coverage {
             Coverage::Opaque => [L::splat(0.5), one],
@@ -112,13 +104,13 @@ impl<L: Lanes> Colors<L> {
                 [L::splat(MIN_LAYER_WEIGHT), (sums.weight / L::splat(saturation)).least(one)]
             }
         };
-        let enough = least.less_or_equal(sums.weight) & valid;
+        let enough = least.less_or_equal(sums.weight);
         let (alpha, colored) = if OPAQUE {
             // The weights and their opaque parts are the same sums.
             (covered, enough)
         } else {
             let opacity = sums.weight_opacity / sums.weight;
-            ((covered * opacity).least(one), enough & sums.weight_opacity.greater(L::splat(0.0)))
+            ((covered * opacity).least(one), enough & L::splat(0.0).less(sums.weight_opacity))
         };
         for (sum, weighted) in self.color.iter_mut().zip(sums.weight_opacity_color) {
             let contribution = self.transmittance * alpha * (weighted / sums.weight_opacity);
@@ -156,105 +148,149 @@ impl<L: Lanes> Sums<L> {
 }
 
 /// A cell in the making.
-struct CellResolver<'a, L, const TWO_SIDED: bool, const OPAQUE: bool> {
-    entries: &'a [Entry],
+struct CellResolver<'a, L, const OPAQUE: bool> {
+    /// The entries of each facing, in splat order, or nothing where all of them are resolved.
+    remaining: [&'a [Entry]; 2],
     buffer: &'a RecordBuffer,
     coverage: Coverage,
-    /// How far the last layer of each facing reached: only what begins beyond remains. Not a number before the first.
-    done: [L; 2],
     colors: Colors<L>,
 }
 
-impl<L: Lanes, const TWO_SIDED: bool, const OPAQUE: bool> CellResolver<'_, L, TWO_SIDED, OPAQUE> {
+impl<L: Lanes, const OPAQUE: bool> CellResolver<'_, L, OPAQUE> {
     /// The colours of the eight samples.
     #[inline(always)]
     fn resolve(mut self) -> Colors<L> {
-        // Most samples end with the first opaque layer, for which nothing has to be left out.
-        self.layer::<true>();
-        while self.layer::<false>() {}
+        let [fronts, backs] = self.remaining;
+        let complete = if backs.is_empty() {
+            self.single_surface(0)
+        } else if fronts.is_empty() {
+            self.single_surface(1)
+        } else {
+            let [front, back] = [self.nearest(0), self.nearest(1)];
+            let backs_first = back.less(front).bits();
+            let hit = (front.least(back)).less(L::splat(f32::INFINITY)).bits();
+            if backs_first == 0 {
+                self.single_surface(0) && (self.is_opaque() || self.single_surface(1))
+            } else if backs_first == hit {
+                self.single_surface(1) && (self.is_opaque() || self.single_surface(0))
+            } else {
+                false
+            }
+        };
+        if !complete {
+            self.all_surfaces();
+        }
         self.colors
     }
 
-    /// The facing of an entry.
+    /// Whether nothing behind could be seen.
     #[inline(always)]
-    fn facing(entry: Entry) -> usize {
-        if TWO_SIDED { usize::from(entry.splat.is_back()) } else { 0 }
+    fn is_opaque(&self) -> bool {
+        L::splat(0.0).less(self.colors.transmittance).bits() == 0
     }
 
-    /// Depth, and near and far end of its interval, of an entry's fragments. Infinite where there is none.
+    /// The least depth of a facing's fragments, infinite where there is none.
     #[inline(always)]
-    fn interval(&self, entry: Entry) -> [L; 3] {
+    fn nearest(&self, facing: usize) -> L {
+        let mut nearest = L::splat(f32::INFINITY);
+        for &entry in self.remaining[facing] {
+            nearest = L::load(&self.buffer.record(entry).depth).least(nearest);
+        }
+        nearest
+    }
+
+    /// Near and far end of the intervals of an entry's fragments; not a number where there is none.
+    #[inline(always)]
+    fn interval(&self, entry: Entry, surface: &SplatSurface) -> [L; 2] {
         let depth = L::load(&self.buffer.record(entry).depth);
-        let [slope, cap] = self.buffer.surface(entry).interval;
+        let [slope, cap] = surface.interval;
         let half = (L::splat(slope) * depth).least(L::splat(cap));
-        [depth, depth - half, depth + half]
+        [depth - half, depth + half]
     }
 
-    /// Composites the nearest layer of what remains. False if there is none that could be seen.
+    /// Composites all of a facing's fragments as one layer, if it is one wherever it is hit: if in each sample the
+    /// intervals have a point in common. So it is with almost all samples of a smooth surface, and costs a single pass.
+    /// Else does nothing, and gives false.
     #[inline(always)]
-    fn layer<const FIRST: bool>(&mut self) -> bool {
-        let live = self.colors.transmittance.greater(L::splat(0.0));
-        if !FIRST && live.bits() == 0 {
+    fn single_surface(&mut self, facing: usize) -> bool {
+        let mut last_near = L::splat(f32::NEG_INFINITY);
+        let mut first_far = L::splat(f32::INFINITY);
+        let mut sums = Sums::zero();
+        for &entry in self.remaining[facing] {
+            let surface = self.buffer.surface(entry);
+            let [near, far] = self.interval(entry, surface);
+            last_near = near.greatest(last_near);
+            first_far = far.least(first_far);
+            sums.add::<OPAQUE>(L::load(&self.buffer.record(entry).weight), surface);
+        }
+        if last_near.not_less_or_equal(first_far).bits() != 0 {
             return false;
         }
-        let infinity = L::splat(f32::INFINITY);
-        let nearest = self.nearest::<FIRST>();
-        let back = nearest[1].less(nearest[0]);
-        let start = if TWO_SIDED { back.select(nearest[1], nearest[0]) } else { nearest[0] };
-        let valid = start.less(infinity) & live;
-        if valid.bits() == 0 {
-            return false;
-        }
-        let of_facing = if TWO_SIDED { [valid.and_not(back), valid & back] } else { [valid; 2] };
-        let (sums, far) = self.grow::<FIRST>(start, of_facing);
-        self.colors.composite::<OPAQUE>(&sums, self.coverage, valid);
-        for (done, mask) in self.done.iter_mut().zip(of_facing) {
-            *done = mask.select(far, *done);
-        }
+        self.colors.composite::<OPAQUE>(&sums, self.coverage);
+        self.remaining[facing] = &[];
         true
     }
 
-    /// The least depth that remains, for each facing.
+    /// Composites what remains, layer by layer.
     #[inline(always)]
-    fn nearest<const FIRST: bool>(&self) -> [L; 2] {
+    fn all_surfaces(&mut self) {
         let infinity = L::splat(f32::INFINITY);
-        let mut nearest = [infinity; 2];
-        for &entry in self.entries {
-            let facing = Self::facing(entry);
-            let depth = if FIRST {
-                L::load(&self.buffer.record(entry).depth)
-            } else {
-                let [depth, near, _] = self.interval(entry);
-                near.less_or_equal(self.done[facing]).select(infinity, depth)
-            };
-            nearest[facing] = depth.least(nearest[facing]);
+        // How far the last layer of each facing reached: only what begins beyond remains. Not a number before the first.
+        let mut done = [L::splat(f32::NAN); 2];
+        loop {
+            let live = L::splat(0.0).less(self.colors.transmittance);
+            let [front, back] = [self.nearest_beyond(0, done[0]), self.nearest_beyond(1, done[1])];
+            let is_back = back.less(front);
+            let start = is_back.select(back, front);
+            let valid = start.less(infinity) & live;
+            if valid.bits() == 0 {
+                return;
+            }
+            let of_facing = [valid.and_not(is_back), valid & is_back];
+            let (sums, end) = self.grow(start, &done, &of_facing);
+            self.colors.composite::<OPAQUE>(&sums, self.coverage);
+            for (done, mask) in done.iter_mut().zip(of_facing) {
+                *done = mask.select(end, *done);
+            }
+        }
+    }
+
+    /// The least depth of a facing's fragments whose intervals begin beyond `done`.
+    #[inline(always)]
+    fn nearest_beyond(&self, facing: usize, done: L) -> L {
+        let infinity = L::splat(f32::INFINITY);
+        let mut nearest = infinity;
+        for &entry in self.remaining[facing] {
+            let [near, _] = self.interval(entry, self.buffer.surface(entry));
+            let depth = L::load(&self.buffer.record(entry).depth);
+            nearest = near.less_or_equal(done).select(infinity, depth).least(nearest);
         }
         nearest
     }
 
     /// The sums of the layer that grows from the depths `start`, and its far end. `of_facing` are the lanes in which that
-    /// layer is of each facing.
+    /// layer is of each facing; what does not begin beyond `done` belongs to earlier ones.
     #[inline(always)]
-    fn grow<const FIRST: bool>(&self, start: L, of_facing: [L; 2]) -> (Sums<L>, L) {
+    fn grow(&self, start: L, done: &[L; 2], of_facing: &[L; 2]) -> (Sums<L>, L) {
         let infinity = L::splat(f32::INFINITY);
         let mut end = start;
         loop {
             let mut sums = Sums::zero();
             let mut next = infinity;
-            for &entry in self.entries {
-                let facing = Self::facing(entry);
-                let [_, near, far] = self.interval(entry);
-                let mut candidate = of_facing[facing];
-                if !FIRST {
-                    candidate = candidate.and_not(near.less_or_equal(self.done[facing]));
+            for facing in 0..2 {
+                for &entry in self.remaining[facing] {
+                    let surface = self.buffer.surface(entry);
+                    let [near, far] = self.interval(entry, surface);
+                    let candidate = of_facing[facing].and_not(near.less_or_equal(done[facing]));
+                    let member = candidate & near.less_or_equal(end);
+                    end = far.or_not(member).greatest(end);
+                    next = near.or_not(candidate.and_not(member)).least(next);
+                    sums.add::<OPAQUE>(L::load(&self.buffer.record(entry).weight) & member, surface);
                 }
-                let member = candidate & near.less_or_equal(end);
-                end = member.select(far.greatest(end), end);
-                next = candidate.and_not(member).select(near, infinity).least(next);
-                sums.add::<OPAQUE>(L::load(&self.buffer.record(entry).weight) & member, self.buffer.surface(entry));
             }
             // What was passed over may overlap what was absorbed after it.
-            if (next.less_or_equal(end) & (of_facing[0] | of_facing[1]) & next.less(infinity)).bits() == 0 {
+            let overlaps = next.less_or_equal(end) & next.less(infinity) & (of_facing[0] | of_facing[1]);
+            if overlaps.bits() == 0 {
                 return (sums, end);
             }
         }

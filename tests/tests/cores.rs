@@ -142,7 +142,7 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let filter =
         prop_oneof![Just(PixelFilter::Box), Just(PixelFilter::Tent), Just(PixelFilter::BlackmanHarris)];
     let kernel = prop_oneof![Just(Kernel::Gaussian), Just(Kernel::Windowed), Just(Kernel::Disc)];
-    let table = prop_oneof![3 => Just(TableMode::Quartic8), 1 => Just(TableMode::Lerp256), 1 => Just(TableMode::Floor256)];
+    let table = prop_oneof![3 => Just(TableMode::Poly8), 1 => Just(TableMode::Quartic8), 1 => Just(TableMode::Lerp256), 1 => Just(TableMode::Floor256)];
     let thickness = prop_oneof![Just(0.0), Just(0.5), Just(3.0)];
     (
         resolve,

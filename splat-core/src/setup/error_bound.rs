@@ -138,14 +138,13 @@ impl SplatConstants<f64> {
         self.bound(position, errors, depth_error, r2)
     }
 
-    /// Adds the second order, and the band in which membership is open: r2 = u u + v v takes three roundings, and
-    /// the division-free test rounds F g^2 twice and nu^2 + nv^2 twice.
+    /// Adds the second order, and the band in which membership is open: r2 = u u + v v takes three roundings.
     fn bound(&self, position: [f64; 2], errors: [f64; 2], depth_error: f64, r2: f64) -> ErrorBound {
         let [u, v] = errors.map(|error| SECOND_ORDER * error);
         let membership = 2.0 * (position[0].abs() * u + position[1].abs() * v)
             + u * u
             + v * v
-            + 5.0 * EPSILON * r2.max(dot(position, position));
+            + 3.0 * EPSILON * r2.max(dot(position, position));
         ErrorBound { u, v, depth: SECOND_ORDER * depth_error, membership }
     }
 }

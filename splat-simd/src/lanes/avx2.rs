@@ -69,6 +69,7 @@ operator!(BitOr, bitor, _mm256_or_ps);
 
 impl Lanes for Avx2 {
     const CELLS: usize = 1;
+    type Index = __m256i;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -106,9 +107,15 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn greater(self, other: Self) -> Self {
+    fn not_less(self, other: Self) -> Self {
         // SAFETY: see the module's documentation.
-        Self(unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0) })
+        Self(unsafe { _mm256_cmp_ps::<_CMP_NLT_UQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn not_less_or_equal(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm256_cmp_ps::<_CMP_NLE_UQ>(self.0, other.0) })
     }
 
     #[inline(always)]
@@ -173,11 +180,14 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn look_up(self, table: &Eight) -> Self {
+    fn to_index(self) -> __m256i {
+        // SAFETY: see the module's documentation.
+        unsafe { _mm256_cvttps_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn look_up(table: &Eight, index: __m256i) -> Self {
         // SAFETY: see the module's documentation; the permutation reads three bits of each index.
-        unsafe {
-            let entries = _mm256_loadu_ps(table.as_ptr());
-            Self(_mm256_permutevar8x32_ps(entries, _mm256_cvttps_epi32(self.0)))
-        }
+        Self(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), index) })
     }
 }

@@ -76,6 +76,7 @@ impl Avx512 {
 
 impl Lanes for Avx512 {
     const CELLS: usize = 2;
+    type Index = __m512i;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -120,9 +121,15 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn greater(self, other: Self) -> Self {
+    fn not_less(self, other: Self) -> Self {
         // SAFETY: see the module's documentation.
-        Self::from_mask(unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0) })
+        Self::from_mask(unsafe { _mm512_cmp_ps_mask::<_CMP_NLT_UQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn not_less_or_equal(self, other: Self) -> Self {
+        // SAFETY: see the module's documentation.
+        Self::from_mask(unsafe { _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(self.0, other.0) })
     }
 
     #[inline(always)]
@@ -181,13 +188,19 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn look_up(self, table: &Eight) -> Self {
+    fn to_index(self) -> __m512i {
+        // SAFETY: see the module's documentation.
+        unsafe { _mm512_cvttps_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn look_up(table: &Eight, index: __m512i) -> Self {
         // SAFETY: see the module's documentation; the table stands in both halves, so that any four bits of an index find
         // an entry.
         unsafe {
             let half = _mm256_loadu_ps(table.as_ptr());
             let entries = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(half), half);
-            Self(_mm512_permutexvar_ps(_mm512_cvttps_epi32(self.0), entries))
+            Self(_mm512_permutexvar_ps(index, entries))
         }
     }
 }

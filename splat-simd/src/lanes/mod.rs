@@ -30,6 +30,9 @@ pub trait Lanes:
     /// Number of cells that a vector spans: 1 or 2.
     const CELLS: usize;
 
+    /// For each lane the number of an entry of a table of eight.
+    type Index: Copy;
+
     /// The same value in every lane.
     fn splat(value: f32) -> Self;
 
@@ -48,8 +51,11 @@ pub trait Lanes:
     /// Lanes where self <= other.
     fn less_or_equal(self, other: Self) -> Self;
 
-    /// Lanes where self > other.
-    fn greater(self, other: Self) -> Self;
+    /// Lanes where not self < other: also where one of them is NaN.
+    fn not_less(self, other: Self) -> Self;
+
+    /// Lanes where not self <= other: also where one of them is NaN.
+    fn not_less_or_equal(self, other: Self) -> Self;
 
     /// The lesser of two numbers; `other` where one of them is NaN.
     fn least(self, other: Self) -> Self;
@@ -78,8 +84,11 @@ pub trait Lanes:
     /// The greatest integer that is not greater, of numbers whose magnitude is below 2^31; arbitrary for others.
     fn round_down(self) -> Self;
 
-    /// For each lane, the entry of `table` whose number is the lane's integer in [0, 8).
-    fn look_up(self, table: &Eight) -> Self;
+    /// The numbers of the entries of a table of eight for lanes in [0, 8); arbitrary ones for others.
+    fn to_index(self) -> Self::Index;
+
+    /// For each lane, an entry of `table`.
+    fn look_up(table: &Eight, index: Self::Index) -> Self;
 
     /// The lanes of one cell, in every cell.
     #[inline(always)]

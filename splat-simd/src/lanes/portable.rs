@@ -5,6 +5,7 @@ use wide::f32x8;
 
 impl Lanes for f32x8 {
     const CELLS: usize = 1;
+    type Index = [i32; LANES];
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -37,8 +38,13 @@ impl Lanes for f32x8 {
     }
 
     #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.simd_gt(other)
+    fn not_less(self, other: Self) -> Self {
+        !self.simd_lt(other)
+    }
+
+    #[inline(always)]
+    fn not_less_or_equal(self, other: Self) -> Self {
+        !self.simd_le(other)
     }
 
     #[inline(always)]
@@ -91,8 +97,13 @@ impl Lanes for f32x8 {
     }
 
     #[inline(always)]
-    fn look_up(self, table: &Eight) -> Self {
+    fn to_index(self) -> [i32; LANES] {
+        self.fast_trunc_int().to_array()
+    }
+
+    #[inline(always)]
+    fn look_up(table: &Eight, index: [i32; LANES]) -> Self {
         // The remainder keeps what a lane without a hit holds within the table.
-        Self::new(self.to_array().map(|index| table[index as usize % LANES]))
+        Self::new(index.map(|index| table[index as usize % LANES]))
     }
 }
