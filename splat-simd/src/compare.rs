@@ -74,11 +74,12 @@ impl<'a> SplatBySplat<'a> {
             places: &mut self.places,
         });
         self.records.group();
-        for cell in 0..PLACES * groups {
-            let [entries, _] = self.records.cell(cell);
-            let [column, row] = pixel_of((cell / groups) as u16);
+        let cells = (0..PLACES as u16).flat_map(|place| (0..groups).map(move |group| (place, group)));
+        for (pixel, group) in cells {
+            let [entries, _] = self.records.cell(pixel, group);
+            let [column, row] = pixel_of(pixel);
             for lane in (0..LANES).filter(|_| !entries.is_empty()) {
-                let sample = first + cell % groups * LANES + lane;
+                let sample = first + group * LANES + lane;
                 let place = SamplePlace { x: x + column, y: y + row, sample };
                 for fragment in entries.iter().filter_map(|&entry| self.records.fragment(entry, lane)) {
                     sink(place, fragment);

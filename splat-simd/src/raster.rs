@@ -2,9 +2,9 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Kernel, LANES, Lanes, prefetch};
-use crate::places::PlaceList;
+use crate::places::{PLACES, PlaceList};
 use crate::records::{Hits, Page, RecordBuffer};
-use crate::samples::{LaneSamples, limits};
+use crate::samples::{GroupSamples, LaneSamples, limits};
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
 use splat_core::kernel::{KernelTable, Polynomials};
@@ -68,6 +68,11 @@ const PINHOLE: u8 = 0;
 const THIN_LENS: u8 = 1;
 const ORTHOGRAPHIC: u8 = 2;
 
+// Which hits are taken: those of lens points on the eye's side of the splat's plane, of the others, or of all.
+const ANY_SIDE: u8 = 0;
+const SAME_SIDE: u8 = 1;
+const OTHER_SIDE: u8 = 2;
+
 impl RasterJob<'_> {
     #[inline(always)]
     fn with_table<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
@@ -103,9 +108,6 @@ impl RasterJob<'_> {
     }
 }
 
-/// A group of the samples of a pixel: its place in its tile, and the group's number.
-type Cell = (u16, usize);
-
 /// A splat ready to be evaluated in a frame.
 struct Evaluation<'a, L, T> {
     samples: &'a LaneSamples,
@@ -137,73 +139,81 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Tests all samples of a list of pixels. `PLAIN` is that of the splat, here and below.
     #[inline(always)]
     fn rasterize<const FORM: u8, const PLAIN: bool>(&self, list: &PlaceList, mut page: Page<'_>) {
-        let groups = self.samples.groups();
-        if groups == 1 {
-            let mut pairs = list.places().chunks_exact(L::CELLS);
-            for places in &mut pairs {
-                if L::CELLS == 2 {
-                    self.test::<FORM, PLAIN, true>(list, [(places[0], 0), (places[1], 0)], 1, &mut page);
-                } else {
-                    self.test::<FORM, PLAIN, false>(list, [(places[0], 0); 2], 1, &mut page);
-                }
+        let back = self.splat.back;
+        if FORM == THIN_LENS && self.splat.flips {
+            // Once for each side: few splats stand so that the lens sees both.
+            if !(self.culls && back) {
+                self.side::<FORM, PLAIN, SAME_SIDE>(list, &mut page, back);
             }
-            if let [place] = pairs.remainder() {
-                self.test::<FORM, PLAIN, false>(list, [(*place, 0); 2], 1, &mut page);
+            if !(self.culls && !back) {
+                self.side::<FORM, PLAIN, OTHER_SIDE>(list, &mut page, !back);
             }
-        } else {
-            for &place in list.places() {
-                for group in (0..groups).step_by(L::CELLS) {
-                    if L::CELLS == 2 && group + 1 < groups {
-                        let cells = [(place, group), (place, group + 1)];
-                        self.test::<FORM, PLAIN, true>(list, cells, groups, &mut page);
-                    } else {
-                        self.test::<FORM, PLAIN, false>(list, [(place, group); 2], groups, &mut page);
-                    }
-                }
-            }
+        } else if !(self.culls && back) {
+            self.side::<FORM, PLAIN, ANY_SIDE>(list, &mut page, back);
         }
         page.close();
     }
 
-    /// Tests the samples of a cell, or if `BOTH` of two.
+    /// Tests all samples of a list of pixels, and takes the hits of `SIDE`, which see the back of the splat or its front.
     #[inline(always)]
-    fn test<const FORM: u8, const PLAIN: bool, const BOTH: bool>(
+    fn side<const FORM: u8, const PLAIN: bool, const SIDE: u8>(
         &self,
         list: &PlaceList,
-        cells: [Cell; 2],
-        groups: usize,
         page: &mut Page<'_>,
+        back: bool,
     ) {
-        let hits = self.evaluate::<FORM, PLAIN>(list, cells);
-        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.missed);
-        let missed = hits.missed | L::splat(0.0).not_less(weight);
-        let numbers = [
-            usize::from(cells[0].0) * groups + cells[0].1,
-            usize::from(cells[1].0) * groups + cells[1].1,
-        ];
-        let (back, depth) = (self.splat.back, hits.depth);
-        if FORM != THIN_LENS {
-            put::<L, BOTH>(page, numbers, back, &Hits { missed, depth, weight });
-            return;
-        }
-        // A lens may see both sides.
-        let flipped = if self.splat.flips { hits.flipped.and_not(missed) } else { L::splat(0.0) };
-        if flipped.bits() != 0 && !(self.culls && !back) {
-            let missed = L::splat(0.0).or_not(flipped);
-            put::<L, BOTH>(page, numbers, !back, &Hits { missed, depth, weight });
-        }
-        if !(self.culls && back) {
-            put::<L, BOTH>(page, numbers, back, &Hits { missed: missed | flipped, depth, weight });
+        for group in 0..self.samples.groups() {
+            let samples = self.samples.group(group);
+            let mut column = page.column(group, back);
+            let mut pairs = list.places().chunks_exact(L::CELLS);
+            for places in &mut pairs {
+                let places = [places[0], places[L::CELLS - 1]];
+                let hits = self.hits::<FORM, PLAIN, SIDE>(list, samples, places);
+                column.put::<L, 0>(places[0], &hits);
+                if L::CELLS == 2 {
+                    column.put::<L, 1>(places[1], &hits);
+                }
+            }
+            if let [place] = pairs.remainder() {
+                let hits = self.hits::<FORM, PLAIN, SIDE>(list, samples, [*place; 2]);
+                column.put::<L, 0>(*place, &hits);
+            }
+            column.close();
         }
     }
 
-    /// The hits in one cell (given twice), or in two.
+    /// The fragments in one place (given twice), or in two.
     #[inline(always)]
-    fn evaluate<const FORM: u8, const PLAIN: bool>(&self, list: &PlaceList, cells: [Cell; 2]) -> LaneHits<L> {
-        let [first, second] = cells;
-        let (jitter_a, jitter_b) =
-            (self.samples.jitter(first.0, first.1), self.samples.jitter(second.0, second.1));
-        let (offset_a, offset_b) = (list.offset(first.0), list.offset(second.0));
+    fn hits<const FORM: u8, const PLAIN: bool, const SIDE: u8>(
+        &self,
+        list: &PlaceList,
+        samples: &GroupSamples,
+        places: [u16; 2],
+    ) -> Hits<L> {
+        let hits = self.evaluate::<FORM, PLAIN>(list, samples, places);
+        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.missed);
+        let mut missed = hits.missed | L::splat(0.0).not_less(weight);
+        match SIDE {
+            SAME_SIDE => missed = missed | hits.flipped,
+            OTHER_SIDE => missed = missed.or_not(hits.flipped),
+            _ => {}
+        }
+        Hits { missed, depth: hits.depth, weight }
+    }
+
+    /// The hits in one place (given twice), or in two.
+    #[inline(always)]
+    fn evaluate<const FORM: u8, const PLAIN: bool>(
+        &self,
+        list: &PlaceList,
+        samples: &GroupSamples,
+        [first, second]: [u16; 2],
+    ) -> LaneHits<L> {
+        let patterns = self.samples.patterns();
+        let (pattern_a, pattern_b) =
+            (patterns[usize::from(first) % PLACES], patterns[usize::from(second) % PLACES]);
+        let (jitter_a, jitter_b) = (samples.jitter(pattern_a), samples.jitter(pattern_b));
+        let (offset_a, offset_b) = (list.offset(first), list.offset(second));
         let jitter = [
             L::load_cells(&jitter_a[0], &jitter_b[0]) + self.minus_fraction[0],
             L::load_cells(&jitter_a[1], &jitter_b[1]) + self.minus_fraction[1],
@@ -215,21 +225,12 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         match FORM {
             PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
             THIN_LENS => {
-                let (a, b) = (self.samples.lens(first.0, first.1), self.samples.lens(second.0, second.1));
+                let (a, b) = (samples.lens(pattern_a), samples.lens(pattern_b));
                 let p = [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])];
                 self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
             }
             _ => self.lane_splat.orthographic(d, &self.limits),
         }
-    }
-}
-
-/// Puts the hits of one cell, or if `BOTH` of two, on a page.
-#[inline(always)]
-fn put<L: Lanes, const BOTH: bool>(page: &mut Page<'_>, cells: [usize; 2], back: bool, hits: &Hits<L>) {
-    page.put::<L, 0>(cells[0], back, hits);
-    if BOTH {
-        page.put::<L, 1>(cells[1], back, hits);
     }
 }
 

@@ -3,7 +3,6 @@
 use crate::lanes::{Eight, LANES, Lanes};
 use crate::places::PLACES;
 use splat_abuffer::{Fragment, SplatSurface};
-use std::ops::Range;
 
 /// The fragments of one splat in the eight samples of a cell: where there is none, a depth that is not a number and no
 /// weight.
@@ -16,11 +15,25 @@ pub struct Record {
     pub weight: Eight,
 }
 
-/// The list that a record belongs to, and its splat.
+/// The list that a record belongs to in the lower half, and its splat in the upper.
 #[derive(Debug, Clone, Copy, Default)]
-struct Key {
-    list: u32,
-    splat: LocalSplat,
+struct Key(u64);
+
+impl Key {
+    #[inline(always)]
+    fn new(list: u32, splat: LocalSplat) -> Self {
+        Self(u64::from(splat.0) << 32 | u64::from(list))
+    }
+
+    #[inline(always)]
+    fn list(self) -> usize {
+        self.0 as u32 as usize
+    }
+
+    #[inline(always)]
+    fn splat(self) -> LocalSplat {
+        LocalSplat((self.0 >> 32) as u32)
+    }
 }
 
 /// A splat of a region: its number in the region's list in the upper 31 bits, the facing that was hit in the lowest.
@@ -66,13 +79,16 @@ pub struct RecordBuffer {
     /// The splats of the region: their ranks, and what their fragments share.
     ranks: Vec<u32>,
     surfaces: Vec<SplatSurface>,
-    /// Number of lists a cell: one, or one for fronts and one for backs.
+    groups: usize,
+    /// One list a cell, or one for fronts and one for backs.
     sides: usize,
-    /// For each list of each cell the number of its records, then, grouped, where its entries end.
-    ends: Vec<u32>,
+    /// For each side, group and place the number of its records; then, grouped, where its entries end.
+    lists: Vec<[u32; PLACES]>,
     entries: Vec<Entry>,
     /// The buffer takes no new splat when it holds more records than this.
     limit: usize,
+    /// Whether each splat overwrites the one before.
+    forgets: bool,
     complete: bool,
     /// Fragments stored.
     pub fragments: u64,
@@ -96,20 +112,30 @@ impl RecordBuffer {
     /// Empties the buffer, for a region of pixels of `groups` cells. It will take splats until it holds more than `limit`
     /// records, and keep fronts and backs apart if `two_sided`.
     pub fn clear(&mut self, groups: usize, two_sided: bool, limit: usize) {
+        self.groups = groups;
         self.sides = 1 + usize::from(two_sided);
         self.limit = limit;
+        self.forgets = false;
         self.complete = true;
         self.count = 0;
         self.ranks.clear();
         self.surfaces.clear();
-        self.ends.clear();
-        self.ends.resize(PLACES * groups * self.sides, 0);
+        self.lists.clear();
+        self.lists.resize(groups * self.sides, [0; PLACES]);
         self.fragments = 0;
+    }
+
+    /// Makes the buffer forget each splat's records when the next one begins: to measure how long they take to make.
+    pub fn forget(&mut self) {
+        self.forgets = true;
     }
 
     /// Begins with a splat, of which at most `cells` cells are hit. `None` if there is no room for it.
     #[inline(always)]
     pub fn begin(&mut self, rank: u32, surface: &SplatSurface, cells: usize) -> Option<Page<'_>> {
+        if self.forgets {
+            self.count = 0;
+        }
         if self.count > self.limit {
             self.complete = false;
             return None;
@@ -125,10 +151,11 @@ impl RecordBuffer {
         self.surfaces.push(*surface);
         Some(Page {
             number: self.ranks.len() as u32 - 1,
+            groups: self.groups,
             sides: self.sides,
-            keys: &mut self.keys[..self.records.len()],
             records: &mut self.records,
-            list_counts: &mut self.ends,
+            keys: &mut self.keys,
+            lists: &mut self.lists,
             count: self.count,
             fragments: self.fragments,
             totals: (&mut self.count, &mut self.fragments),
@@ -143,39 +170,40 @@ impl RecordBuffer {
     /// Groups the records by cell and side; within one they stay in splat order (a stable counting sort).
     pub fn group(&mut self) {
         let mut start = 0;
-        for end in &mut self.ends {
+        let lists = self.lists.as_flattened_mut();
+        for end in &mut *lists {
             start += std::mem::replace(end, start);
         }
         if self.entries.len() < self.count {
             self.entries.resize(self.records.len(), Entry::default());
         }
         for (number, key) in self.keys[..self.count].iter().enumerate() {
-            let position = &mut self.ends[key.list as usize];
-            self.entries[*position as usize] = Entry { record: number as u32, splat: key.splat };
+            let position = &mut lists[key.list()];
+            self.entries[*position as usize] = Entry { record: number as u32, splat: key.splat() };
             *position += 1;
         }
     }
 
-    /// The entries of a cell, each side in splat order, after [`RecordBuffer::group`]: fronts and backs, or all and none.
+    /// The entries of a group of a place, each side in splat order, after [`RecordBuffer::group`]: fronts and backs, or all
+    /// and none.
     #[inline(always)]
-    pub fn cell(&self, cell: usize) -> [&[Entry]; 2] {
-        if self.sides == 1 {
-            [self.list(cell..cell + 1), &[]]
-        } else {
-            [self.list(2 * cell..2 * cell + 1), self.list(2 * cell + 1..2 * cell + 2)]
-        }
+    pub fn cell(&self, place: u16, group: usize) -> [&[Entry]; 2] {
+        let fronts = self.list(group, place);
+        [fronts, if self.sides == 1 { &[] } else { self.list(self.groups + group, place) }]
     }
 
-    /// Whether some cells have no entries.
+    /// Whether a place has no records.
     #[inline(always)]
-    pub fn are_empty(&self, cells: Range<usize>) -> bool {
-        self.list(cells.start * self.sides..cells.end * self.sides).is_empty()
+    pub fn is_empty(&self, place: u16) -> bool {
+        (0..self.groups * self.sides).all(|list| self.list(list, place).is_empty())
     }
 
     #[inline(always)]
-    fn list(&self, lists: Range<usize>) -> &[Entry] {
-        let start = if lists.start == 0 { 0 } else { self.ends[lists.start - 1] };
-        &self.entries[start as usize..self.ends[lists.end - 1] as usize]
+    fn list(&self, side_and_group: usize, place: u16) -> &[Entry] {
+        let list = side_and_group * PLACES + usize::from(place);
+        let ends = self.lists.as_flattened();
+        let start = if list == 0 { 0 } else { ends[list - 1] };
+        &self.entries[start as usize..ends[list] as usize]
     }
 
     /// The record of an entry.
@@ -204,8 +232,9 @@ impl RecordBuffer {
 pub struct Page<'a> {
     records: &'a mut [Record],
     keys: &'a mut [Key],
-    list_counts: &'a mut [u32],
+    lists: &'a mut [[u32; PLACES]],
     number: u32,
+    groups: usize,
     sides: usize,
     count: usize,
     fragments: u64,
@@ -213,24 +242,61 @@ pub struct Page<'a> {
     totals: (&'a mut usize, &'a mut u64),
 }
 
+/// The part of a page for a group of samples and a side.
+#[derive(Debug)]
+pub struct Column<'a> {
+    records: &'a mut [Record],
+    keys: &'a mut [Key],
+    /// The number of records of each place's list.
+    counts: &'a mut [u32; PLACES],
+    /// Key of place 0.
+    key: Key,
+    count: usize,
+    fragments: u64,
+    totals: (&'a mut usize, &'a mut u64),
+}
+
 impl Page<'_> {
-    /// Takes the hits of a cell: `CELL` of the lanes.
+    /// Where the hits of a group of samples go, on a side.
     #[inline(always)]
-    pub fn put<L: Lanes, const CELL: usize>(&mut self, cell: usize, back: bool, hits: &Hits<L>) {
+    pub fn column(&mut self, group: usize, back: bool) -> Column<'_> {
+        let list = if self.sides == 2 && back { self.groups + group } else { group };
+        Column {
+            keys: &mut self.keys[..self.records.len()],
+            records: self.records,
+            counts: &mut self.lists[list],
+            key: Key::new((list * PLACES) as u32, LocalSplat::new(self.number, back)),
+            count: self.count,
+            fragments: self.fragments,
+            totals: (&mut self.count, &mut self.fragments),
+        }
+    }
+
+    /// Ends the splat.
+    #[inline(always)]
+    pub fn close(self) {
+        *self.totals.0 = self.count;
+        *self.totals.1 = self.fragments;
+    }
+}
+
+impl Column<'_> {
+    /// Takes the hits in a place: `CELL` of the lanes.
+    #[inline(always)]
+    pub fn put<L: Lanes, const CELL: usize>(&mut self, place: u16, hits: &Hits<L>) {
         let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
         // Written in any case, but kept only if something was hit: a branch would be mispredicted at every rim.
         let record = &mut self.records[self.count];
         (hits.depth | hits.missed).store_cell::<CELL>(&mut record.depth);
         hits.weight.and_not(hits.missed).store_cell::<CELL>(&mut record.weight);
-        let list = if self.sides == 1 { cell } else { 2 * cell + usize::from(back) };
-        self.keys[self.count] = Key { list: list as u32, splat: LocalSplat::new(self.number, back) };
+        self.keys[self.count] = Key(self.key.0 | u64::from(place));
         let kept = u32::from(misses != u8::MAX);
-        self.list_counts[list] += kept;
+        self.counts[usize::from(place) % PLACES] += kept;
         self.count += kept as usize;
         self.fragments += u64::from(misses.count_zeros());
     }
 
-    /// Ends the splat.
+    /// Ends the column.
     #[inline(always)]
     pub fn close(self) {
         *self.totals.0 = self.count;

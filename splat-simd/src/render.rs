@@ -141,6 +141,40 @@ impl Renderer {
         Ok(Rendered { film, statistics })
     }
 
+    /// Makes every fragment of a picture and forgets it at once: to measure how long that takes. The time is
+    /// [`Statistics::raster`].
+    ///
+    /// # Errors
+    /// As [`splat_core::render()`].
+    pub fn rasterize(
+        &mut self,
+        cloud: &Cloud,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<Statistics, Error> {
+        let frame = self.threads.install(|| Frame::new(cloud, camera, options, set_up))?;
+        let start = Instant::now();
+        let tiles = tiles(&frame.set_up.splats, &frame.view.window);
+        let mut statistics = frame.statistics(start.elapsed());
+        let picture = Picture {
+            cloud,
+            camera,
+            options,
+            frame: &frame,
+            samples: LaneSamples::new(&frame.rasterizer),
+            surfaces: frame.set_up.surfaces(),
+            level: self.level,
+        };
+        let counts: Vec<Statistics> = self.threads.install(|| {
+            let tiles = tiles.par_iter();
+            tiles.map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, region, ranks))).collect()
+        });
+        for count in &counts {
+            add(&mut statistics, count);
+        }
+        Ok(statistics)
+    }
+
     /// Lends one of the kept buffers, or a new one.
     fn with_worker<T>(&self, work: impl FnOnce(&mut Worker) -> T) -> T {
         // A poisoned lock only means that another tile panicked; the buffers are cleared before use.
@@ -194,6 +228,18 @@ impl Picture<'_> {
         let mut statistics = Statistics::default();
         self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics);
         Tile { film, statistics }
+    }
+
+    /// Makes the fragments of a tile and forgets them.
+    fn count(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Statistics {
+        let start = Instant::now();
+        let Worker { records, places, .. } = worker;
+        records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
+        records.forget();
+        let frame = self.raster_frame();
+        let tests = self.level.run(RasterJob { frame, ranks, region: *region, records, places });
+        let fragments = records.fragments;
+        Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 
     /// Renders a part of a tile, in quarters if its records exceed the budget.
@@ -279,15 +325,13 @@ impl Picture<'_> {
         film: &mut Film,
     ) {
         let range = self.frame.rasterizer.range();
-        let groups = self.samples.groups();
         let Worker { records, fragments, .. } = worker;
         for y in region.y0..region.y1 {
             for x in region.x0..region.x1 {
-                let first = usize::from(place_of(x, y)) * groups;
                 pixels.start();
                 for sample in range.clone() {
                     let number = sample - range.start;
-                    let cell = records.cell(first + number / LANES);
+                    let cell = records.cell(place_of(x, y), number / LANES);
                     fragments.clear();
                     fragments
                         .extend(cell.into_iter().flatten().filter_map(|&entry| records.fragment(entry, number % LANES)));

@@ -45,14 +45,14 @@ impl ResolveJob<'_, '_> {
         let groups = self.samples.groups();
         for y in self.region.y0..self.region.y1 {
             for x in self.region.x0..self.region.x1 {
-                let cell = usize::from(place_of(x, y)) * groups;
-                if self.buffer.are_empty(cell..cell + groups) {
+                let place = place_of(x, y);
+                if self.buffer.is_empty(place) {
                     continue;
                 }
                 self.pixels.start();
                 for group in 0..groups {
                     let resolver = CellResolver::<L, OPAQUE> {
-                        remaining: self.buffer.cell(cell + group),
+                        remaining: self.buffer.cell(place, group),
                         buffer: self.buffer,
                         coverage: self.coverage,
                         colors: Colors::nothing(),

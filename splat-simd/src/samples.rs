@@ -6,17 +6,22 @@ use crate::places::{PLACES, pixel_of};
 use splat_core::raster::Rasterizer;
 use splat_core::sampling::PATTERNS;
 
-/// The positions and lens points of every pattern, in cells of eight samples of which the last may be padded.
-///
-/// The position of a padded lane is not a number, so it never hits.
+/// The samples of a frame in groups of eight, of which the last may be padded.
 #[derive(Debug)]
 pub struct LaneSamples {
-    groups: usize,
     samples: usize,
-    jitter: Vec<[Eight; 2]>,
-    lens: Vec<[Eight; 2]>,
-    /// For each place of a tile, where its cells begin in `jitter` and in `lens`.
-    first: Box<[[u32; 2]; PLACES]>,
+    groups: Vec<GroupSamples>,
+    /// For each place of a tile, the numbers of its patterns: of positions, and of lens points.
+    patterns: Box<[[u8; 2]; PLACES]>,
+}
+
+/// A group of the samples of every pattern.
+#[derive(Debug)]
+pub struct GroupSamples {
+    /// Positions relative to the pixel's corner. Where a lane is no sample they are not numbers, so that it never hits.
+    jitter: [[Eight; 2]; PATTERNS],
+    /// Lens points, as [`splat_core::evaluate::LensPoint::p`].
+    lens: [[Eight; 2]; PATTERNS],
 }
 
 impl LaneSamples {
@@ -24,41 +29,41 @@ impl LaneSamples {
     pub fn new(rasterizer: &Rasterizer) -> Self {
         let range = rasterizer.range();
         let samples = rasterizer.samples();
-        let groups = range.len().div_ceil(LANES);
-        let number = |group: usize, lane: usize| {
-            let number = range.start + group * LANES + lane;
-            (number < range.end).then_some(number)
+        let group = |group: usize| {
+            let number = |lane: usize| {
+                let number = range.start + group * LANES + lane;
+                (number < range.end).then_some(number)
+            };
+            let cell = |value: &dyn Fn(usize, usize) -> f32, padding: f32| {
+                [0, 1].map(|axis| {
+                    std::array::from_fn(|lane| number(lane).map_or(padding, |number| value(number, axis)))
+                })
+            };
+            GroupSamples {
+                jitter: std::array::from_fn(|pattern| {
+                    let points = samples.jitter_of_pattern(pattern);
+                    cell(&|number, axis| points[number][axis], f32::NAN)
+                }),
+                lens: std::array::from_fn(|pattern| {
+                    let points = samples.lens_of_pattern(pattern);
+                    cell(&|number, axis| points.get(number).map_or(0.0, |point| point.p[axis]), 0.0)
+                }),
+            }
         };
-        let cells = || (0..PATTERNS).flat_map(|pattern| (0..groups).map(move |group| (pattern, group)));
-        let jitter = cells().map(|(pattern, group)| {
-            let points = samples.jitter_of_pattern(pattern);
-            [0, 1].map(|axis| {
-                std::array::from_fn(|lane| number(group, lane).map_or(f32::NAN, |number| points[number][axis]))
-            })
-        });
-        let with_lens = cells().filter(|&(pattern, _)| !samples.lens_of_pattern(pattern).is_empty());
-        let lens = with_lens.map(|(pattern, group)| {
-            let points = samples.lens_of_pattern(pattern);
-            [0, 1].map(|axis| {
-                std::array::from_fn(|lane| number(group, lane).map_or(0.0, |number| points[number].p[axis]))
-            })
-        });
-        let first = |place| {
+        let patterns = |place| {
             let [x, y] = pixel_of(place as u16);
-            samples.patterns_of(x, y).map(|pattern| (pattern * groups) as u32)
+            samples.patterns_of(x, y).map(|pattern| pattern as u8)
         };
         Self {
-            groups,
             samples: range.len(),
-            jitter: jitter.collect(),
-            lens: lens.collect(),
-            first: Box::new(std::array::from_fn(first)),
+            groups: (0..range.len().div_ceil(LANES)).map(group).collect(),
+            patterns: Box::new(std::array::from_fn(patterns)),
         }
     }
 
-    /// Number of cells a pixel.
+    /// Number of groups a pixel.
     pub fn groups(&self) -> usize {
-        self.groups
+        self.groups.len()
     }
 
     /// Number of samples a pixel.
@@ -66,21 +71,35 @@ impl LaneSamples {
         self.samples
     }
 
-    /// Number of samples in a cell of a pixel.
+    /// Number of samples in a group of a pixel.
     pub fn samples_of(&self, group: usize) -> usize {
         LANES.min(self.samples - group * LANES)
     }
 
-    /// The cell of a place: positions relative to the pixel's corner.
+    /// The samples of a group.
     #[inline(always)]
-    pub fn jitter(&self, place: u16, group: usize) -> &[Eight; 2] {
-        &self.jitter[self.first[usize::from(place) % PLACES][0] as usize + group]
+    pub fn group(&self, group: usize) -> &GroupSamples {
+        &self.groups[group]
     }
 
-    /// The lens points of the cell of a place, as [`splat_core::evaluate::LensPoint::p`].
+    /// For each place of a tile, the numbers of its patterns.
     #[inline(always)]
-    pub fn lens(&self, place: u16, group: usize) -> &[Eight; 2] {
-        &self.lens[self.first[usize::from(place) % PLACES][1] as usize + group]
+    pub fn patterns(&self) -> &[[u8; 2]; PLACES] {
+        &self.patterns
+    }
+}
+
+impl GroupSamples {
+    /// The positions of a pattern, relative to the pixel's corner.
+    #[inline(always)]
+    pub fn jitter(&self, [filter, _]: [u8; 2]) -> &[Eight; 2] {
+        &self.jitter[usize::from(filter) % PATTERNS]
+    }
+
+    /// The lens points of a pattern.
+    #[inline(always)]
+    pub fn lens(&self, [_, lens]: [u8; 2]) -> &[Eight; 2] {
+        &self.lens[usize::from(lens) % PATTERNS]
     }
 }
 

@@ -67,7 +67,8 @@ pub struct VisibleSplat {
     pub weight_scale: f32,
     /// Whether the eye sees its back.
     pub back: bool,
-    /// Whether its facing depends on where it is seen from: its normal tells the outside from the inside.
+    /// Whether its facing depends on the point of the lens: its normal tells the outside from the inside, and the lens may
+    /// reach through its plane.
     pub flips: bool,
     /// Whether in `bounds` the cutoff alone decides what is a hit: its centre is the reference point, near and far plane are
     /// well away, and for a pinhole all samples lie well before the horizon of its plane (g > 0).
@@ -164,10 +165,20 @@ fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOption
         index: index as u32,
         weight_scale: weight_scale(cloud, index, options),
         back: splat.back,
-        flips: cloud.oriented,
+        flips: cloud.oriented && sees_both_sides(&exact, view),
         plain: is_plain(&exact, &bounds, view.depth_extent(&splat, hit_radius), view),
         nearest: splat.center.z - half_depth(&splat, radius),
         surface: surface(cloud, index, &splat, view, options),
+    })
+}
+
+/// Whether some points of the lens may see the other side than the eye: whether 1 - h.q (which is 1 at the eye) can be
+/// negative, or so near to 0 that rounding could make it so.
+fn sees_both_sides(constants: &SplatConstants<f64>, view: &View) -> bool {
+    view.lens_pixels().is_some_and(|[px, py]| {
+        let [hx, hy] = constants.lens_slope.map(f64::abs);
+        let certain = hx * px + hy * py < 1.0 - 1.0 / 1024.0;
+        !certain
     })
 }
 
