@@ -3,7 +3,7 @@
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Kernel, LANES, Lanes, prefetch};
 use crate::places::{PLACES, PlaceList};
-use crate::records::{Hits, Page, RecordBuffer};
+use crate::records::{Page, Record, RecordBuffer};
 use crate::samples::{GroupSamples, LaneSamples, limits};
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
@@ -151,7 +151,54 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         } else if !(self.culls && back) {
             self.side::<FORM, PLAIN, ANY_SIDE>(list, &mut page, back);
         }
-        page.close();
+        let fragments = self.weigh(page.records());
+        page.close(fragments);
+    }
+
+    /// Turns the r2 of some records into weights, and drops what weighs nothing. Returns the number of fragments left.
+    ///
+    /// Not at once where the hits are found: this way neither loop is so long that the processor sees only one cell of it
+    /// at a time, and only what is hit is weighed.
+    #[inline(always)]
+    fn weigh(&self, records: &mut [Record]) -> u32 {
+        let mut fragments = 0;
+        let mut pairs = records.chunks_exact_mut(L::CELLS);
+        for pair in &mut pairs {
+            if let [first, second] = pair {
+                let depth = L::load_cells(&first.depth, &second.depth);
+                let weight = L::load_cells(&first.weight, &second.weight);
+                let (depth, weight, missed) = self.weighed(depth, weight);
+                depth.store_cell::<0>(&mut first.depth);
+                depth.store_cell::<1>(&mut second.depth);
+                weight.store_cell::<0>(&mut first.weight);
+                weight.store_cell::<1>(&mut second.weight);
+                fragments += (missed.bits() as u16).count_zeros();
+            } else if let [record] = pair {
+                fragments += self.weigh_one(record);
+            }
+        }
+        if let [record] = pairs.into_remainder() {
+            fragments += self.weigh_one(record);
+        }
+        fragments
+    }
+
+    /// [`Self::weigh`] for one record.
+    #[inline(always)]
+    fn weigh_one(&self, record: &mut Record) -> u32 {
+        let (depth, weight, missed) = self.weighed(L::load(&record.depth), L::load(&record.weight));
+        depth.store_cell::<0>(&mut record.depth);
+        weight.store_cell::<0>(&mut record.weight);
+        (missed.bits() as u8).count_zeros()
+    }
+
+    /// Depth, weight, and whether there is no fragment, given depths (not numbers where there is none) and r2.
+    #[inline(always)]
+    fn weighed(&self, depth: L, r2: L) -> (L, L, L) {
+        let missed = depth.not_less_or_equal(L::splat(f32::INFINITY));
+        let weight = self.weight_scale * self.table.kernel(r2, missed);
+        let missed = missed | L::splat(0.0).not_less(weight);
+        (depth | missed, weight.and_not(missed), missed)
     }
 
     /// Tests all samples of a list of pixels, and takes the hits of `SIDE`, which see the back of the splat or its front.
@@ -182,23 +229,21 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         }
     }
 
-    /// The fragments in one place (given twice), or in two.
+    /// The hits of `SIDE` in one place (given twice), or in two.
     #[inline(always)]
     fn hits<const FORM: u8, const PLAIN: bool, const SIDE: u8>(
         &self,
         list: &PlaceList,
         samples: &GroupSamples,
         places: [u16; 2],
-    ) -> Hits<L> {
-        let hits = self.evaluate::<FORM, PLAIN>(list, samples, places);
-        let weight = self.weight_scale * self.table.kernel(hits.r2, hits.missed);
-        let mut missed = hits.missed | L::splat(0.0).not_less(weight);
+    ) -> LaneHits<L> {
+        let mut hits = self.evaluate::<FORM, PLAIN>(list, samples, places);
         match SIDE {
-            SAME_SIDE => missed = missed | hits.flipped,
-            OTHER_SIDE => missed = missed.or_not(hits.flipped),
+            SAME_SIDE => hits.missed = hits.missed | hits.flipped,
+            OTHER_SIDE => hits.missed = hits.missed.or_not(hits.flipped),
             _ => {}
         }
-        Hits { missed, depth: hits.depth, weight }
+        hits
     }
 
     /// The hits in one place (given twice), or in two.

@@ -1,5 +1,6 @@
 //! The fragments of a region, eight samples a record.
 
+use crate::evaluate::LaneHits;
 use crate::lanes::{Eight, LANES, Lanes};
 use crate::places::PLACES;
 use splat_abuffer::{Fragment, SplatSurface};
@@ -94,17 +95,6 @@ pub struct RecordBuffer {
     pub fragments: u64,
 }
 
-/// The fragments of a splat in one cell, or two.
-#[derive(Debug, Clone, Copy)]
-pub struct Hits<L> {
-    /// Set where the lane is not hit.
-    pub missed: L,
-    /// View depths; arbitrary where there is no hit.
-    pub depth: L,
-    /// Weights; arbitrary where there is no hit.
-    pub weight: L,
-}
-
 impl RecordBuffer {
     /// Bytes that a record needs with all that belongs to it.
     pub const BYTES_PER_RECORD: usize = size_of::<Record>() + size_of::<Key>() + size_of::<Entry>();
@@ -156,8 +146,8 @@ impl RecordBuffer {
             records: &mut self.records,
             keys: &mut self.keys,
             lists: &mut self.lists,
+            first: self.count,
             count: self.count,
-            fragments: self.fragments,
             totals: (&mut self.count, &mut self.fragments),
         })
     }
@@ -236,8 +226,8 @@ pub struct Page<'a> {
     number: u32,
     groups: usize,
     sides: usize,
+    first: usize,
     count: usize,
-    fragments: u64,
     /// The buffer's own counts, brought up to date by [`Page::close`].
     totals: (&'a mut usize, &'a mut u64),
 }
@@ -252,8 +242,7 @@ pub struct Column<'a> {
     /// Key of place 0.
     key: Key,
     count: usize,
-    fragments: u64,
-    totals: (&'a mut usize, &'a mut u64),
+    total: &'a mut usize,
 }
 
 impl Page<'_> {
@@ -267,39 +256,42 @@ impl Page<'_> {
             counts: &mut self.lists[list],
             key: Key::new((list * PLACES) as u32, LocalSplat::new(self.number, back)),
             count: self.count,
-            fragments: self.fragments,
-            totals: (&mut self.count, &mut self.fragments),
+            total: &mut self.count,
         }
     }
 
-    /// Ends the splat.
+    /// The records of the page.
     #[inline(always)]
-    pub fn close(self) {
+    pub fn records(&mut self) -> &mut [Record] {
+        &mut self.records[self.first..self.count]
+    }
+
+    /// Ends the splat, which has this many fragments.
+    #[inline(always)]
+    pub fn close(self, fragments: u32) {
         *self.totals.0 = self.count;
-        *self.totals.1 = self.fragments;
+        *self.totals.1 += u64::from(fragments);
     }
 }
 
 impl Column<'_> {
-    /// Takes the hits in a place: `CELL` of the lanes.
+    /// Takes the hits in a place: `CELL` of the lanes. For the time being their r2 stand in place of their weights.
     #[inline(always)]
-    pub fn put<L: Lanes, const CELL: usize>(&mut self, place: u16, hits: &Hits<L>) {
-        let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
+    pub fn put<L: Lanes, const CELL: usize>(&mut self, place: u16, hits: &LaneHits<L>) {
         // Written in any case, but kept only if something was hit: a branch would be mispredicted at every rim.
         let record = &mut self.records[self.count];
         (hits.depth | hits.missed).store_cell::<CELL>(&mut record.depth);
-        hits.weight.and_not(hits.missed).store_cell::<CELL>(&mut record.weight);
+        hits.r2.store_cell::<CELL>(&mut record.weight);
         self.keys[self.count] = Key(self.key.0 | u64::from(place));
+        let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
         let kept = u32::from(misses != u8::MAX);
         self.counts[usize::from(place) % PLACES] += kept;
         self.count += kept as usize;
-        self.fragments += u64::from(misses.count_zeros());
     }
 
     /// Ends the column.
     #[inline(always)]
     pub fn close(self) {
-        *self.totals.0 = self.count;
-        *self.totals.1 = self.fragments;
+        *self.total = self.count;
     }
 }

@@ -38,11 +38,14 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     }
 }
 
-/// Asks the processor to fetch what it will soon need.
+/// Asks the processor to fetch what it will soon need: all cache lines of an item.
 #[inline(always)]
 pub fn prefetch<T>(item: &T) {
-    // SAFETY: every x86-64 processor has the instruction, and it never faults.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(item).cast()) }
+    let bytes: *const i8 = std::ptr::from_ref(item).cast();
+    for offset in (0..size_of::<T>()).step_by(64).chain([size_of::<T>().max(1) - 1]) {
+        // SAFETY: every x86-64 processor has the instruction, and it never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(bytes.wrapping_add(offset)) }
+    }
 }
 
 /// Implements an operator by an intrinsic.

@@ -173,11 +173,15 @@ impl Level {
 
     /// Runs a kernel on lanes of one cell.
     pub fn run_single<K: Kernel>(self, kernel: K) -> K::Output {
-        self.min(Self::Avx2).run(kernel)
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 | Self::Avx512 => avx2::run(kernel),
+            _ => kernel.run::<wide::f32x8>(),
+        }
     }
 }
 
-/// Asks the processor to fetch what it will soon need.
+/// Asks the processor to fetch what it will soon need: all cache lines of an item.
 #[inline(always)]
 pub fn prefetch<T>(item: &T) {
     #[cfg(target_arch = "x86_64")]
