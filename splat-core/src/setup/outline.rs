@@ -12,7 +12,7 @@ const MAX_REACH: f64 = 4096.0;
 /// An ellipse on the picture, in pixels relative to the corner of the splat's pixel (xi, yi).
 ///
 /// It holds every sample position from which the splat may be hit, through any point of the lens, in `f32` as in exact
-/// arithmetic: the projection of the disc whose box are the candidates (see [`super::margin`]), widened by the circle
+/// arithmetic: the projection of the disc whose box are the candidates (see `setup/margin.rs`), widened by the circle
 /// of confusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outline {
