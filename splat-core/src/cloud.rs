@@ -142,6 +142,7 @@ impl Cloud {
     /// Why the splat must not be rendered, or `None` if it is fit. SPEC section 2.
     ///
     /// Expects a cloud whose arrays belong together and whose normals are known.
+    #[inline]
     pub fn defect(&self, index: usize) -> Option<Defect> {
         let finite = self.positions[index].is_finite()
             && self.normals[index].is_finite()

@@ -177,14 +177,10 @@ impl SplatConstants<f64> {
 impl SplatConstants<f32> {
     /// Whether every constant is finite.
     pub fn is_finite(&self) -> bool {
-        [self.xf, self.yf, self.a1, self.depth, self.defocus, self.edge_on]
-            .iter()
-            .chain(&self.h)
-            .chain(&self.b)
-            .chain(&self.reference)
-            .chain(&self.depth_slope)
-            .chain(&self.lens_slope)
-            .all(|value| value.is_finite())
+        let pairs = [self.h, self.b, self.reference, self.depth_slope, self.lens_slope];
+        let values = [self.xf, self.yf, self.a1, self.depth, self.defocus, self.edge_on];
+        // All of them nearly always: no use in stopping at the first.
+        values.iter().chain(pairs.as_flattened()).fold(true, |finite, value| finite & value.is_finite())
     }
 }
 

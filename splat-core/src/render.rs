@@ -59,21 +59,27 @@ pub fn render(
     let frame = Frame::new(cloud, camera, options, set_up)?;
     let window = frame.view.window;
     let start = Instant::now();
-    let tiles = tiles(&frame.set_up.splats, &window);
-    let surfaces = frame.set_up.surfaces();
+    let tiles = Tiles::new(&frame.set_up.splats, &window);
     let mut picture = Picture {
         frame: &frame,
         film: Film::new([camera.width, camera.height], window, options.aovs),
-        pixels: PixelResolver::new(cloud, camera, options, &frame.view, &frame.set_up.splats, &surfaces),
+        pixels: PixelResolver::new(
+            cloud,
+            camera,
+            options,
+            &frame.view,
+            &frame.set_up.splats,
+            &frame.set_up.surfaces,
+        ),
         buffer: TileBuffer::default(),
         budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
         statistics: frame.statistics(start.elapsed()),
     };
     picture.film.position_origin = cloud.origin;
     let count = tiles.len();
-    for (number, (region, ranks)) in tiles.into_iter().enumerate() {
+    for (number, (region, ranks)) in tiles.iter().enumerate() {
         progress(number as f64 / count as f64);
-        picture.render_region(&region, &ranks);
+        picture.render_region(&region, ranks);
     }
     progress(1.0);
     Ok(Rendered { film: picture.film, statistics: picture.statistics })
@@ -158,26 +164,115 @@ impl Frame {
 
 /// The tiles of a window, each with the ranks of the splats that may leave fragments in it, in splat order. The grid
 /// starts at the frame's corner, whatever the window.
-pub fn tiles(splats: &[VisibleSplat], window: &PixelRect) -> Vec<(PixelRect, Vec<u32>)> {
-    let first = [window.x0.div_euclid(TILE), window.y0.div_euclid(TILE)];
-    let columns = (window.x1 - 1).div_euclid(TILE) - first[0] + 1;
-    let rows = (window.y1 - 1).div_euclid(TILE) - first[1] + 1;
-    let mut tiles: Vec<(PixelRect, Vec<u32>)> = (0..rows)
-        .flat_map(|row| (0..columns).map(move |column| (column, row)))
-        .map(|(column, row)| {
-            let [x, y] = [(first[0] + column) * TILE, (first[1] + row) * TILE];
-            (PixelRect::new(x, y, x + TILE, y + TILE).intersect(window), Vec::new())
-        })
-        .collect();
-    for (rank, splat) in splats.iter().enumerate() {
-        let bounds = &splat.bounds;
-        for row in bounds.y0.div_euclid(TILE)..=(bounds.y1 - 1).div_euclid(TILE) {
-            for column in bounds.x0.div_euclid(TILE)..=(bounds.x1 - 1).div_euclid(TILE) {
-                tiles[((row - first[1]) * columns + column - first[0]) as usize].1.push(rank as u32);
-            }
+#[derive(Debug)]
+pub struct Tiles {
+    window: PixelRect,
+    grid: Grid,
+    /// All lists, one after the other.
+    ranks: Vec<u32>,
+    /// Where the list of each tile ends; it starts where that before ends.
+    ends: Vec<usize>,
+}
+
+impl Tiles {
+    /// Sorts splats, whose bounds lie in the window, into its tiles.
+    pub fn new(splats: &[VisibleSplat], window: &PixelRect) -> Self {
+        let grid = Grid::new(window);
+        let spans: Vec<Span> = splats.iter().map(|splat| grid.span(&splat.bounds)).collect();
+        // The length of each list first, so that all fit into one array; then where it starts, which each rank moves on.
+        let mut ends = vec![0; grid.len()];
+        for &span in &spans {
+            grid.for_each_tile(span, |tile| ends[tile] += 1);
+        }
+        let mut total = 0;
+        for end in &mut ends {
+            total += std::mem::replace(end, total);
+        }
+        let mut ranks = vec![0; total];
+        for (rank, &span) in spans.iter().enumerate() {
+            grid.for_each_tile(span, |tile| {
+                ranks[ends[tile]] = rank as u32;
+                ends[tile] += 1;
+            });
+        }
+        Self { window: *window, grid, ranks, ends }
+    }
+
+    /// Number of tiles.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The pixels of a tile, and the ranks of its splats.
+    pub fn get(&self, tile: usize) -> (PixelRect, &[u32]) {
+        let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
+        (self.grid.pixels(tile).intersect(&self.window), &self.ranks[start..self.ends[tile]])
+    }
+
+    /// [`Tiles::get`] of each tile, row by row.
+    pub fn iter(&self) -> impl Iterator<Item = (PixelRect, &[u32])> {
+        (0..self.len()).map(|tile| self.get(tile))
+    }
+}
+
+/// The grid of the tiles of a window, numbered row by row.
+#[derive(Debug)]
+struct Grid {
+    /// Column and row of the first tile, counted from the frame's corner.
+    first: [i32; 2],
+    columns: i32,
+    rows: i32,
+}
+
+impl Grid {
+    fn new(window: &PixelRect) -> Self {
+        let first = [window.x0.div_euclid(TILE), window.y0.div_euclid(TILE)];
+        let columns = (window.x1 - 1).div_euclid(TILE) - first[0] + 1;
+        let rows = (window.y1 - 1).div_euclid(TILE) - first[1] + 1;
+        Self { first, columns, rows }
+    }
+
+    fn len(&self) -> usize {
+        (self.columns * self.rows) as usize
+    }
+
+    fn pixels(&self, tile: usize) -> PixelRect {
+        let tile = tile as i32;
+        let x = (self.first[0] + tile % self.columns) * TILE;
+        let y = (self.first[1] + tile / self.columns) * TILE;
+        PixelRect::new(x, y, x + TILE, y + TILE)
+    }
+
+    /// The tiles that a rectangle within the window reaches into.
+    fn span(&self, bounds: &PixelRect) -> Span {
+        // A side of a frame has at most 2048 tiles.
+        let tile = |pixel: i32, axis: usize| (pixel.div_euclid(TILE) - self.first[axis]) as u16;
+        Span {
+            columns: [tile(bounds.x0, 0), tile(bounds.x1 - 1, 0)],
+            rows: [tile(bounds.y0, 1), tile(bounds.y1 - 1, 1)],
         }
     }
-    tiles
+
+    /// Calls `visit` with the number of each tile of a span.
+    fn for_each_tile(&self, span: Span, mut visit: impl FnMut(usize)) {
+        let [first, last] = span.columns.map(usize::from);
+        for row in span.rows[0]..=span.rows[1] {
+            let start = usize::from(row) * self.columns as usize;
+            (start + first..start + last + 1).for_each(&mut visit);
+        }
+    }
+}
+
+/// Some tiles of a grid: first and last column, first and last row.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    columns: [u16; 2],
+    rows: [u16; 2],
 }
 
 /// A picture in the making.

@@ -6,9 +6,10 @@ use crate::raster::{RasterFrame, RasterJob};
 use crate::records::RecordBuffer;
 use crate::render::set_up;
 use crate::samples::LaneSamples;
-use splat_abuffer::{Fragment, SplatSurface};
+use splat_abuffer::Fragment;
 use splat_core::raster::SamplePlace;
 use splat_core::render::Frame;
+use splat_core::setup::SetUp;
 use splat_core::{Camera, Cloud, Error, PixelRect, RenderOptions};
 
 /// Pixels around a splat's candidates in which [`compare`] looks for hits of the reference that neither core visits.
@@ -18,7 +19,6 @@ const BORDER: i32 = 2;
 struct SplatBySplat<'a> {
     frame: &'a Frame,
     samples: LaneSamples,
-    surfaces: Vec<SplatSurface>,
     level: Level,
     records: RecordBuffer,
     places: PlaceList,
@@ -29,7 +29,6 @@ impl<'a> SplatBySplat<'a> {
         Self {
             frame,
             samples: LaneSamples::new(&frame.rasterizer),
-            surfaces: frame.set_up.surfaces(),
             level,
             records: RecordBuffer::default(),
             places: PlaceList::default(),
@@ -62,7 +61,7 @@ impl<'a> SplatBySplat<'a> {
             rasterizer: &self.frame.rasterizer,
             samples: &self.samples,
             splats: &self.frame.set_up.splats,
-            surfaces: &self.surfaces,
+            surfaces: &self.frame.set_up.surfaces,
             filter_radius: self.frame.view.filter_radius as f32,
         };
         self.records.clear(groups, false, usize::MAX);
@@ -102,7 +101,9 @@ pub fn fragments(
     level: Level,
     sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
 ) -> Result<u64, Error> {
-    let frame = Frame::new(cloud, camera, options, set_up)?;
+    let frame = Frame::new(cloud, camera, options, |cloud, view, options| {
+        set_up(cloud, view, options, SetUp::default())
+    })?;
     let mut fast = SplatBySplat::new(&frame, level);
     let splats = frame.set_up.splats.iter().enumerate();
     Ok(splats
@@ -136,7 +137,9 @@ pub fn compare(
     level: Level,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Result<u64, Difference>, Error> {
-    let frame = Frame::new(cloud, camera, options, set_up)?;
+    let frame = Frame::new(cloud, camera, options, |cloud, view, options| {
+        set_up(cloud, view, options, SetUp::default())
+    })?;
     let mut core = SplatBySplat::new(&frame, level);
     let count = frame.set_up.splats.len();
     let (mut reference, mut fast) = (Vec::new(), Vec::new());

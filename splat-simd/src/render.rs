@@ -7,17 +7,23 @@ use crate::records::RecordBuffer;
 use crate::resolve::ResolveJob;
 use crate::samples::LaneSamples;
 use rayon::prelude::*;
-use splat_abuffer::{Coverage, Fragment, Resolve, SplatSurface, Thickness};
+use splat_abuffer::{Coverage, Fragment, Resolve, Thickness};
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
-use splat_core::render::{Frame, quarters, tiles};
-use splat_core::setup::{SetUp, View, set_up_range, splat_order};
+use splat_core::render::{Frame, Tiles, quarters};
+use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Splats that a task of the parallel set-up takes.
+/// Splats that a task of the parallel set-up takes in its first step.
 const SET_UP_CHUNK: usize = 4096;
+
+/// The same for its second step.
+const SET_UP_PART: usize = 1024;
+
+/// Tasks of that step whose results are joined at once.
+const SET_UP_PARTS: usize = 16;
 
 /// Tiles between two reports of progress, per thread.
 const TILES_A_REPORT: usize = 16;
@@ -28,6 +34,8 @@ pub struct Renderer {
     level: Level,
     threads: rayon::ThreadPool,
     workers: Mutex<Vec<Worker>>,
+    /// That of the last picture, kept for its memory.
+    set_up: SetUp,
 }
 
 /// The buffers of a thread.
@@ -51,7 +59,6 @@ struct Picture<'a> {
     options: &'a RenderOptions,
     frame: &'a Frame,
     samples: LaneSamples,
-    surfaces: Vec<SplatSurface>,
     level: Level,
 }
 
@@ -76,7 +83,7 @@ impl Renderer {
     pub fn new(threads: usize, level: Level) -> Result<Self, Error> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let threads = pool.map_err(|error| Error::invalid("threads", error, "fewer threads"))?;
-        Ok(Self { level, threads, workers: Mutex::default() })
+        Ok(Self { level, threads, workers: Mutex::default(), set_up: SetUp::default() })
     }
 
     /// Number of threads.
@@ -101,20 +108,12 @@ impl Renderer {
         options: &RenderOptions,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Rendered, Error> {
-        let frame = self.threads.install(|| Frame::new(cloud, camera, options, set_up))?;
+        let frame = self.frame(cloud, camera, options)?;
         let window = frame.view.window;
         let start = Instant::now();
-        let tiles = tiles(&frame.set_up.splats, &window);
+        let tiles = Tiles::new(&frame.set_up.splats, &window);
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture {
-            cloud,
-            camera,
-            options,
-            frame: &frame,
-            samples: LaneSamples::new(&frame.rasterizer),
-            surfaces: frame.set_up.surfaces(),
-            level: self.level,
-        };
+        let picture = Picture::new(cloud, camera, options, &frame, self.level);
         let mut film = picture.pixels().empty_film(
             [camera.width, camera.height],
             window,
@@ -123,13 +122,14 @@ impl Renderer {
         statistics.samples = (window.area() * frame.rasterizer.range().len()) as u64;
         film.position_origin = cloud.origin;
         let (count, batch) = (tiles.len(), TILES_A_REPORT * self.threads());
-        for (number, tiles) in tiles.chunks(batch).enumerate() {
-            progress((number * batch) as f64 / count as f64);
+        for first in (0..count).step_by(batch) {
+            progress(first as f64 / count as f64);
             let finished: Vec<Tile> = self.threads.install(|| {
-                tiles
-                    .par_iter()
+                (first..count.min(first + batch))
+                    .into_par_iter()
+                    .map(|tile| tiles.get(tile))
                     .filter(|(_, ranks)| !ranks.is_empty())
-                    .map(|(region, ranks)| self.with_worker(|worker| picture.tile(worker, region, ranks)))
+                    .map(|(region, ranks)| self.with_worker(|worker| picture.tile(worker, &region, ranks)))
                     .collect()
             });
             for tile in finished {
@@ -138,6 +138,7 @@ impl Renderer {
             }
         }
         progress(1.0);
+        self.set_up = frame.set_up;
         Ok(Rendered { film, statistics })
     }
 
@@ -152,27 +153,27 @@ impl Renderer {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Statistics, Error> {
-        let frame = self.threads.install(|| Frame::new(cloud, camera, options, set_up))?;
+        let frame = self.frame(cloud, camera, options)?;
         let start = Instant::now();
-        let tiles = tiles(&frame.set_up.splats, &frame.view.window);
+        let tiles = Tiles::new(&frame.set_up.splats, &frame.view.window);
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture {
-            cloud,
-            camera,
-            options,
-            frame: &frame,
-            samples: LaneSamples::new(&frame.rasterizer),
-            surfaces: frame.set_up.surfaces(),
-            level: self.level,
-        };
+        let picture = Picture::new(cloud, camera, options, &frame, self.level);
         let counts: Vec<Statistics> = self.threads.install(|| {
-            let tiles = tiles.par_iter();
-            tiles.map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, region, ranks))).collect()
+            let tiles = (0..tiles.len()).into_par_iter().map(|tile| tiles.get(tile));
+            tiles.map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, &region, ranks))).collect()
         });
         for count in &counts {
             add(&mut statistics, count);
         }
+        self.set_up = frame.set_up;
         Ok(statistics)
+    }
+
+    /// What is ready before the first fragment; in the memory of the last picture.
+    fn frame(&mut self, cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<Frame, Error> {
+        let memory = std::mem::take(&mut self.set_up);
+        let set_up = |cloud: &_, view: &_, options: &_| set_up(cloud, view, options, memory);
+        self.threads.install(|| Frame::new(cloud, camera, options, set_up))
     }
 
     /// Lends one of the kept buffers, or a new one.
@@ -194,30 +195,48 @@ fn add(sum: &mut Statistics, tile: &Statistics) {
     sum.resolve += tile.resolve;
 }
 
-/// [`splat_core::setup::set_up`] in parallel.
-pub(crate) fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
-    let chunks: Vec<SetUp> = (0..cloud.len().div_ceil(SET_UP_CHUNK))
+/// [`splat_core::setup::set_up`] in parallel. `all` gives its memory.
+pub(crate) fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions, mut all: SetUp) -> SetUp {
+    let chunks: Vec<(Vec<SortKey>, Dropped)> = (0..cloud.len().div_ceil(SET_UP_CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let start = chunk * SET_UP_CHUNK;
-            set_up_range(cloud, view, options, start..cloud.len().min(start + SET_UP_CHUNK))
+            sort_keys(cloud, view, options, start..cloud.len().min(start + SET_UP_CHUNK))
         })
         .collect();
-    let mut all = SetUp::default();
-    for chunk in chunks {
-        all.splats.extend(chunk.splats);
-        for (cause, count) in chunk.dropped {
-            *all.dropped.entry(cause).or_default() += count;
-        }
+    all.clear();
+    let mut keys = Vec::with_capacity(chunks.iter().map(|(keys, _)| keys.len()).sum());
+    for (chunk, dropped) in chunks {
+        keys.extend(chunk);
+        all.add_dropped(dropped);
     }
-    all.splats.par_sort_unstable_by(|a, b| splat_order(cloud, a, b));
+    keys.par_sort_unstable();
+    let order = splat_order(cloud, keys);
+    all.reserve(order.len());
+    // A batch at a time: what the tasks hand over is never much, and goes through the same memory.
+    let mut parts = vec![SetUp::default(); SET_UP_PARTS];
+    for batch in order.chunks(SET_UP_PARTS * SET_UP_PART) {
+        let tasks = parts.par_iter_mut().zip(batch.par_chunks(SET_UP_PART));
+        tasks.for_each(|(part, order)| part.extend(cloud, view, options, order));
+        parts.iter_mut().for_each(|part| all.append(part));
+    }
     all
 }
 
-impl Picture<'_> {
+impl<'a> Picture<'a> {
+    fn new(
+        cloud: &'a Cloud,
+        camera: &'a Camera,
+        options: &'a RenderOptions,
+        frame: &'a Frame,
+        level: Level,
+    ) -> Self {
+        Self { cloud, camera, options, frame, samples: LaneSamples::new(&frame.rasterizer), level }
+    }
+
     fn pixels(&self) -> PixelResolver<'_> {
-        let splats = &self.frame.set_up.splats;
-        PixelResolver::new(self.cloud, self.camera, self.options, &self.frame.view, splats, &self.surfaces)
+        let Frame { view, set_up, .. } = self.frame;
+        PixelResolver::new(self.cloud, self.camera, self.options, view, &set_up.splats, &set_up.surfaces)
     }
 
     /// Renders a tile.
@@ -290,7 +309,7 @@ impl Picture<'_> {
             rasterizer: &self.frame.rasterizer,
             samples: &self.samples,
             splats: &self.frame.set_up.splats,
-            surfaces: &self.surfaces,
+            surfaces: &self.frame.set_up.surfaces,
             filter_radius: self.frame.view.filter_radius as f32,
         }
     }

@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use glam::{DVec2, DVec3};
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::sampling::SampleTable;
-use splat_core::setup::{Extent, View, VisibleSplat, camera_splat, half_depth, perspective_extent, set_up};
+use splat_core::setup::{
+    Extent, View, VisibleSplat, camera_splat, half_depth, perspective_extent, set_up, sort_keys,
+};
 use splat_core::{Camera, Cloud, Lens, PixelFilter, PixelRect, Projection, RenderOptions, fragments};
 use splat_tests::brute_force::{self, Rect};
 use splat_tests::core_scenes::{
@@ -97,10 +99,12 @@ fn e01_core_the_depth_extent_of_an_anisotropic_splat() {
     let cloud = ellipses(&[(DVec3::new(0.0, 1.0, 5.0), [axes[0], DVec3::new(0.06, 0.02, 0.08)])]);
     let resolve = Resolve::Surface { coverage: Coverage::Opaque, thickness: Thickness::WholeSplat };
     let options = RenderOptions { resolve, ..hard(2.0, 1) };
-    let found = visible(&cloud, &small(), &options).expect("visible");
-    let (lo, hi) = truth_of(&camera_splat(&cloud, 0, &view(&small(), &options))).depth_extent(2.0);
-    assert!((found.nearest - lo).abs() <= tol::DEPTH_EXTENT);
-    let [near, far] = found.surface.interval.map(f64::from);
+    let view = view(&small(), &options);
+    let (lo, hi) = truth_of(&camera_splat(&cloud, 0, &view)).depth_extent(2.0);
+    let (keys, _) = sort_keys(&cloud, &view, &options, 0..1);
+    assert!((keys[0].nearest() - lo).abs() <= tol::DEPTH_EXTENT);
+    let surface = set_up(&cloud, &view, &options).surfaces.pop().expect("visible");
+    let [near, far] = surface.interval.map(f64::from);
     assert!(
         (near - lo).abs() <= tol::INTERVAL * hi && (far - hi).abs() <= tol::INTERVAL * hi,
         "{near} {far}"

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::test_runner::RngSeed;
 use splat_abuffer::{Coverage, Resolve, Thickness};
-use splat_core::setup::{View, set_up};
+use splat_core::setup::{View, set_up, sort_keys};
 use splat_core::{
     AovSelection, Camera, Cloud, Film, Kernel, Lens, PatternKind, PixelFilter, Projection, RenderOptions,
     Shading, Shapes, TableMode, render,
@@ -163,11 +163,15 @@ fn options() -> impl Strategy<Value = RenderOptions> {
 fn sound(cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<u64, TestCaseError> {
     let view = View::new(camera, options);
     let set_up = set_up(cloud, &view, options);
+    let (keys, _) = sort_keys(cloud, &view, options, 0..cloud.len());
+    let visible = |index| set_up.splats.iter().any(|splat| splat.index == index);
+    prop_assert!(keys.iter().all(|key| !(key.nearest().is_nan() && visible(key.index()))));
+    prop_assert_eq!(set_up.splats.len(), set_up.surfaces.len());
     prop_assert!(set_up.splats.len() + set_up.dropped.values().sum::<usize>() <= N);
     for splat in &set_up.splats {
         prop_assert!(splat.constants.is_finite());
         prop_assert!(!splat.bounds.is_empty() && splat.bounds == splat.bounds.intersect(&view.window));
-        prop_assert!(!splat.nearest.is_nan() && !splat.weight_scale.is_nan());
+        prop_assert!(!splat.weight_scale.is_nan());
     }
     let rendered = render(cloud, camera, options, &mut |_| {});
     let rendered = rendered.map_err(|error| TestCaseError::fail(error.to_string()))?;

@@ -6,8 +6,8 @@ use std::f64::consts::{PI, TAU};
 use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec3};
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use splat_core::setup::{
-    CameraSplat, Extent, SetUp, View, camera_splat, half_depth, orthographic_extent, perspective_extent,
-    set_up,
+    CameraSplat, Extent, SetUp, View, VisibleSplat, camera_splat, half_depth, orthographic_extent,
+    perspective_extent, set_up, sort_keys,
 };
 use splat_core::{Camera, Cloud, Projection, RenderOptions, Shapes, render};
 use splat_tests::brute_force::{self, Disc, Rect};
@@ -411,7 +411,7 @@ fn surface(
     let center = DVec3::new(rng.range(-0.4, 0.4), rng.range(-0.3, 0.3), 1.0) * rng.log_range(1.0, 20.0);
     let axes = random_axes(rng, 0.1 * center.z, 20.0);
     let (set_up, splat) = set_up_one((center, axes), camera, options);
-    Some((set_up.splats.first()?.surface, splat))
+    Some((*set_up.surfaces.first()?, splat))
 }
 
 #[test]
@@ -499,13 +499,13 @@ fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
 /// All that the picture can know of the splats in their order, bit by bit.
 fn data(cloud: &Cloud, set_up: &SetUp) -> Vec<String> {
     let Shapes::Discs(sizes) = &cloud.shapes else { unreachable!() };
-    let line = |splat: &splat_core::setup::VisibleSplat| {
+    let line = |(splat, surface): (&VisibleSplat, &SplatSurface)| {
         let i = splat.index as usize;
         let mut same = *splat;
         same.index = 0;
-        format!("{same:?} {:?} {:?} {}", cloud.positions[i], cloud.normals[i], sizes[i])
+        format!("{same:?} {surface:?} {:?} {:?} {}", cloud.positions[i], cloud.normals[i], sizes[i])
     };
-    set_up.splats.iter().map(line).collect()
+    set_up.splats.iter().zip(&set_up.surfaces).map(line).collect()
 }
 
 #[test]
@@ -518,9 +518,9 @@ fn splat_order_does_not_depend_on_the_file_s() {
         let cloud = tied_cloud(&mut rng);
         let first = set_up(&cloud, &view, &options);
         assert_eq!(first.splats.len(), 60);
-        assert!(first.splats.is_sorted_by_key(|splat| splat.nearest.to_bits()), "positive: as their bits");
-        assert!(first.splats[0].nearest == first.splats[59].nearest, "a tie");
-        let truth = first.splats[0].nearest - truth_of(&camera_splat(&cloud, 0, &view)).depth_extent(4.0).0;
+        let (keys, _) = sort_keys(&cloud, &view, &options, 0..60);
+        assert!(keys.iter().all(|key| key.nearest() == keys[0].nearest()), "a tie");
+        let truth = keys[0].nearest() - truth_of(&camera_splat(&cloud, 0, &view)).depth_extent(4.0).0;
         assert!(truth.abs() <= tol::DEPTH_EXTENT);
         let picture = render(&cloud, &camera, &options, &mut |_| {}).expect("renders").film;
         for _ in 0..5 {
@@ -540,7 +540,41 @@ fn splat_order_does_not_depend_on_the_file_s() {
     let expected = data(&cloud, &wrong);
     let other = expected.iter().position(|line| *line != expected[0]).expect("not all are the same");
     wrong.splats.swap(0, other);
+    wrong.surfaces.swap(0, other);
     assert_ne!(data(&cloud, &wrong), expected);
+}
+
+#[test]
+fn splat_order_is_by_nearest_depth() {
+    let mut rng = Random::new(14);
+    for i in 0..20 {
+        let base = if i % 2 == 0 { pinhole(1, 1, 1.0) } else { orthographic(1, 1, 1.0) };
+        // What crosses an orthographic near plane may begin behind the eye: depths of both signs.
+        let near = if i % 2 == 0 { 0.1 } else { 0.0 };
+        let camera = wide(Camera { world_to_camera: random_camera(&mut rng), near, ..base });
+        let to_world = camera.world_to_camera.inverse();
+        let at = |rng: &mut Random| {
+            let depth = if i % 2 == 0 { rng.range(1.0, 5.0) } else { rng.range(0.0, 0.5) };
+            to_world.transform_point3(DVec3::new(rng.range(-0.5, 0.5), rng.range(-0.5, 0.5), depth))
+        };
+        let random: Vec<_> =
+            (0..100).map(|_| (at(&mut rng), rng.direction(), rng.log_range(0.01, 0.3))).collect();
+        let cloud = if i % 4 < 2 {
+            discs(&random)
+        } else {
+            let axes = |rng: &mut Random, size| random_axes(rng, size, 10.0);
+            ellipses(&random.iter().map(|&(at, _, size)| (at, axes(&mut rng, size))).collect::<Vec<_>>())
+        };
+        let options = hard(4.0, 1);
+        let view = View::new(&camera, &options);
+        let nearest: Vec<f64> = set_up(&cloud, &view, &options)
+            .splats
+            .iter()
+            .map(|splat| truth_of(&camera_splat(&cloud, splat.index as usize, &view)).depth_extent(4.0).0)
+            .collect();
+        assert!(nearest.len() > 50);
+        assert!(nearest.is_sorted_by(|a, b| a <= &(b + tol::DEPTH_EXTENT)), "{nearest:?}");
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ pub struct Extent {
 }
 
 /// Half of the depth extent of a disc of the given radius: radius |t|, t = (T1.w, T2.w) (erratum E1).
+#[inline(always)]
 pub fn half_depth(splat: &CameraSplat, radius: f64) -> f64 {
     radius * DVec2::new(splat.axes[0].z, splat.axes[1].z).length()
 }

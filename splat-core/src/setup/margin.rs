@@ -31,13 +31,14 @@ pub struct Margin {
 
 /// The margin of a splat seen by a pinhole or orthographically. `None` if it is seen edge-on as far as `f32` can
 /// tell: where the error of (u, v) reaches [`MAX_ERROR`].
+#[inline(always)]
 pub fn without_lens(
     constants: &SplatConstants<f64>,
     depth: Extent,
     reach: &Reach,
     view: &View,
 ) -> Option<Margin> {
-    let radius = view.cutoff.sqrt();
+    let radius = view.radius;
     let [h, b] = [constants.h.map(f64::abs), constants.b.map(f64::abs)];
     let a1 = constants.a1.abs();
     let d = reach.in_frame;
@@ -69,7 +70,7 @@ pub fn with_lens(
     lens_pixels: [f64; 2],
     view: &View,
 ) -> Margin {
-    let radius = view.cutoff.sqrt();
+    let radius = view.radius;
     let [h, slope] = [constants.h.map(f64::abs), constants.lens_slope.map(f64::abs)];
     let dot = |p: [f64; 2], q: [f64; 2]| p[0] * q[0] + p[1] * q[1];
     let [g_min, g_max] = [constants.depth / depth.max, constants.depth / depth.min];

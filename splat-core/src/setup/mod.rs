@@ -1,16 +1,24 @@
 //! Set-up, once per splat, in `f64`: SPEC section 3; it replaces L45-159 of the listing.
 //!
-//! One implementation serves every core, so that they agree on what they draw by construction.
+//! One implementation serves every core, so that they agree on what they draw by construction. It takes two steps: the
+//! sort keys of the splats that face the viewer and lie between the planes ([`sort_keys`]), and in their order whatever
+//! else is needed of a splat ([`SetUp::extend`]). So nothing large is ever sorted, and next to nothing is computed of a
+//! splat that faces away.
+//!
+//! What is marked `#[inline(always)]` here passes dozens of numbers, which would else go through memory: it takes a third off
+//! the time.
 
 mod bounds;
 mod error_bound;
 mod margin;
+mod order;
 mod outline;
 mod projection;
 mod view;
 
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
+pub use order::{SortKey, sort_keys, splat_order};
 pub use outline::Outline;
 pub use projection::project;
 pub(crate) use view::Reach;
@@ -19,12 +27,11 @@ pub use view::View;
 use crate::evaluate::SplatConstants;
 use crate::options::Shading;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
-use glam::{DVec3, Vec3, Vec3Swizzles};
+use glam::DVec3;
 use margin::Margin;
+use outline::Ellipse;
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// Colours and weights beyond this are clamped to it, so that no sum of a layer overflows `f32`.
 const MAX_MAGNITUDE: f32 = 1e9;
@@ -73,10 +80,6 @@ pub struct VisibleSplat {
     /// Whether in `bounds` the cutoff alone decides what is a hit: its centre is the reference point, near and far plane are
     /// well away, and for a pinhole all samples lie well before the horizon of its plane (g > 0).
     pub plain: bool,
-    /// Its nearest depth, in camera units: the key of splat order.
-    pub nearest: f64,
-    /// What its fragments share.
-    pub surface: SplatSurface,
 }
 
 /// The result of set-up.
@@ -84,96 +87,161 @@ pub struct VisibleSplat {
 pub struct SetUp {
     /// The splats that may be seen, in splat order: a splat's place here is its rank.
     pub splats: Vec<VisibleSplat>,
+    /// What the fragments of each share, by rank.
+    pub surfaces: Vec<SplatSurface>,
     /// Splats that were never rendered, by cause: [`crate::Defect::name`], or `edge_on`.
-    pub dropped: BTreeMap<&'static str, usize>,
+    pub dropped: Dropped,
 }
 
-impl SetUp {
-    /// What the fragments of each splat share, by rank.
-    pub fn surfaces(&self) -> Vec<SplatSurface> {
-        self.splats.iter().map(|splat| splat.surface).collect()
-    }
-}
+/// Numbers of splats, by the cause of dropping them.
+pub type Dropped = BTreeMap<&'static str, usize>;
 
 /// The cause of dropping a splat whose projection has no area that `f32` could tell.
 const EDGE_ON: &str = "edge_on";
 
-/// Sets up every splat of a cloud whose normals are known.
-pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
-    let mut result = set_up_range(cloud, view, options, 0..cloud.len());
-    result.splats.sort_unstable_by(|a, b| splat_order(cloud, a, b));
-    result
-}
+impl SetUp {
+    /// Makes room for this many splats more.
+    pub fn reserve(&mut self, count: usize) {
+        self.splats.reserve_exact(count);
+        self.surfaces.reserve_exact(count);
+    }
 
-/// Sets up a part of the splats of a cloud, in the order of the cloud.
-pub fn set_up_range(cloud: &Cloud, view: &View, options: &RenderOptions, range: Range<usize>) -> SetUp {
-    let mut result = SetUp::default();
-    for index in range {
-        if let Some(defect) = cloud.defect(index) {
-            *result.dropped.entry(defect.name()).or_default() += 1;
-            continue;
-        }
-        match set_up_splat(cloud, index, view, options) {
-            Outcome::Visible(splat) => result.splats.push(splat),
-            Outcome::EdgeOn => *result.dropped.entry(EDGE_ON).or_default() += 1,
-            Outcome::Culled => {}
+    /// Forgets everything but keeps the memory.
+    pub fn clear(&mut self) {
+        self.splats.clear();
+        self.surfaces.clear();
+        self.dropped.clear();
+    }
+
+    /// Sets up the next splats, given their indices in splat order.
+    pub fn extend(&mut self, cloud: &Cloud, view: &View, options: &RenderOptions, order: &[u32]) {
+        for &index in order {
+            if let Outcome::EdgeOn = self.push(cloud, index as usize, view, options) {
+                count_dropped(&mut self.dropped, EDGE_ON, 1);
+            }
         }
     }
+
+    /// Sets up the next splat, if it is to be seen.
+    #[inline(always)]
+    fn push(&mut self, cloud: &Cloud, index: usize, view: &View, options: &RenderOptions) -> Outcome {
+        let splat = camera_splat(cloud, index, view);
+        let usual = view.radius * (1.0 + margin::USUAL);
+        let Some(exact) = project(&splat, view) else {
+            // A line. It counts as dropped only where it would be seen.
+            let seen = exact_box(&splat, usual, view).map(|screen| candidates(&splat, &screen, usual, view));
+            return if seen.is_some_and(|bounds| bounds.is_empty()) {
+                Outcome::Culled
+            } else {
+                Outcome::EdgeOn
+            };
+        };
+        let Some(mut image) = Image::new(&splat, &exact, usual, view) else { return Outcome::EdgeOn };
+        let mut bounds = candidates(&splat, &image.screen, usual, view);
+        if bounds.is_empty() {
+            return Outcome::Culled;
+        }
+        let Some(margin) = rounding_margin(&splat, &exact, &image.screen, view) else {
+            return Outcome::EdgeOn;
+        };
+        let radius = margin.radius.max(usual);
+        if radius > usual {
+            let Some(wider) = Image::new(&splat, &exact, radius, view) else { return Outcome::EdgeOn };
+            bounds = candidates(&splat, &wider.screen, radius, view);
+            image = wider;
+            if bounds.is_empty() {
+                return Outcome::Culled;
+            }
+        }
+        let constants = SplatConstants { edge_on: margin.edge_on, ..exact }.to_f32();
+        if !constants.is_finite() {
+            return Outcome::EdgeOn;
+        }
+        let depth = view.depth_extent(&splat, radius);
+        self.surfaces.push(surface(cloud, index, &splat, view, options));
+        self.splats.push(VisibleSplat {
+            constants,
+            bounds,
+            outline: image.outline(&exact, depth, view),
+            index: index as u32,
+            weight_scale: weight_scale(cloud, index, view, options),
+            back: splat.back,
+            flips: cloud.oriented && sees_both_sides(&exact, view),
+            plain: is_plain(&exact, &bounds, depth, view),
+        });
+        Outcome::Visible
+    }
+
+    /// Takes over the splats that come next in splat order.
+    pub fn append(&mut self, next: &mut Self) {
+        self.splats.append(&mut next.splats);
+        self.surfaces.append(&mut next.surfaces);
+        self.add_dropped(std::mem::take(&mut next.dropped));
+    }
+
+    /// Adds splats that were dropped before they could be set up.
+    pub fn add_dropped(&mut self, dropped: Dropped) {
+        for (cause, count) in dropped {
+            count_dropped(&mut self.dropped, cause, count);
+        }
+    }
+}
+
+fn count_dropped(dropped: &mut Dropped, cause: &'static str, count: usize) {
+    *dropped.entry(cause).or_default() += count;
+}
+
+/// Sets up every splat of a cloud whose normals are known.
+pub fn set_up(cloud: &Cloud, view: &View, options: &RenderOptions) -> SetUp {
+    let (mut keys, dropped) = sort_keys(cloud, view, options, 0..cloud.len());
+    keys.sort_unstable();
+    let order = splat_order(cloud, keys);
+    let mut result = SetUp { dropped, ..SetUp::default() };
+    result.reserve(order.len());
+    result.extend(cloud, view, options, &order);
     result
 }
 
 /// What becomes of a splat.
 enum Outcome {
-    Visible(VisibleSplat),
+    Visible,
     EdgeOn,
     Culled,
 }
 
-/// Sets up one splat without a defect.
-fn set_up_splat(cloud: &Cloud, index: usize, view: &View, options: &RenderOptions) -> Outcome {
-    let splat = camera_splat(cloud, index, view);
-    let radius = view.cutoff.sqrt();
-    if (options.cull && faces_away(&splat, view)) || view.is_clipped(&splat, radius) {
-        return Outcome::Culled;
+/// What a pinhole or an orthographic camera sees of a disc.
+struct Image {
+    /// Its exact box, `[x, y]` in pixels.
+    screen: [Extent; 2],
+    /// The ellipse that it is, unless it reaches to the camera plane.
+    ellipse: Option<Ellipse>,
+}
+
+impl Image {
+    /// The image of a disc of `radius` sigma. `None` if it is nearer than the near plane.
+    #[inline(always)]
+    fn new(splat: &CameraSplat, constants: &SplatConstants<f64>, radius: f64, view: &View) -> Option<Self> {
+        let ellipse = Ellipse::new(constants, view.orthographic, radius);
+        let uncut = view.orthographic || splat.center.z - half_depth(splat, radius) >= view.box_near();
+        // Nearly always the ellipse knows the box. What the near plane may cut is a matter of its own.
+        let screen = match &ellipse {
+            Some(ellipse) if uncut => ellipse.extents(constants.pixel().to_array()),
+            _ => exact_box(splat, radius, view)?,
+        };
+        Some(Self { screen, ellipse })
     }
-    let usual = radius * (1.0 + margin::USUAL);
-    // What is in front of the near plane has a box, unless it is a line.
-    let Some(screen) = screen_box(&splat, usual, view) else { return Outcome::EdgeOn };
-    let mut bounds = candidates(&splat, &screen, usual, view);
-    if bounds.is_empty() {
-        return Outcome::Culled;
+
+    fn outline(&self, constants: &SplatConstants<f64>, depth: Extent, view: &View) -> Outline {
+        let blur = view.circle_of_confusion(depth) * view.pixel_scale;
+        self.ellipse.as_ref().map_or(Outline::EVERYTHING, |ellipse| {
+            Outline::new(ellipse, [constants.xf, constants.yf], blur.to_array())
+        })
     }
-    let Some(exact) = project(&splat, view) else { return Outcome::EdgeOn };
-    let Some(margin) = rounding_margin(&splat, &exact, &screen, view) else { return Outcome::EdgeOn };
-    if margin.radius > usual {
-        let Some(screen) = screen_box(&splat, margin.radius, view) else { return Outcome::EdgeOn };
-        bounds = candidates(&splat, &screen, margin.radius, view);
-    }
-    if bounds.is_empty() {
-        return Outcome::Culled;
-    }
-    let constants = SplatConstants { edge_on: margin.edge_on, ..exact }.to_f32();
-    if !constants.is_finite() {
-        return Outcome::EdgeOn;
-    }
-    let hit_radius = margin.radius.max(usual);
-    let blur = view.circle_of_confusion(view.depth_extent(&splat, hit_radius)) * view.pixel_scale;
-    Outcome::Visible(VisibleSplat {
-        constants,
-        bounds,
-        outline: Outline::new(&exact, view.orthographic, hit_radius, blur.to_array()),
-        index: index as u32,
-        weight_scale: weight_scale(cloud, index, options),
-        back: splat.back,
-        flips: cloud.oriented && sees_both_sides(&exact, view),
-        plain: is_plain(&exact, &bounds, view.depth_extent(&splat, hit_radius), view),
-        nearest: splat.center.z - half_depth(&splat, radius),
-        surface: surface(cloud, index, &splat, view, options),
-    })
 }
 
 /// Whether some points of the lens may see the other side than the eye: whether 1 - h.q (which is 1 at the eye) can be
 /// negative, or so near to 0 that rounding could make it so.
+#[inline(always)]
 fn sees_both_sides(constants: &SplatConstants<f64>, view: &View) -> bool {
     view.lens_pixels().is_some_and(|[px, py]| {
         let [hx, hy] = constants.lens_slope.map(f64::abs);
@@ -183,6 +251,7 @@ fn sees_both_sides(constants: &SplatConstants<f64>, view: &View) -> bool {
 }
 
 /// [`VisibleSplat::plain`].
+#[inline(always)]
 fn is_plain(constants: &SplatConstants<f64>, bounds: &PixelRect, depth: Extent, view: &View) -> bool {
     if !constants.centred || view.orthographic {
         return false;
@@ -210,41 +279,57 @@ fn is_plain(constants: &SplatConstants<f64>, bounds: &PixelRect, depth: Extent, 
 }
 
 /// The margin that rounding needs; `screen` is the splat's usual box. `None` if it is seen edge-on.
+#[inline(always)]
 fn rounding_margin(
     splat: &CameraSplat,
     exact: &SplatConstants<f64>,
     screen: &[Extent; 2],
     view: &View,
 ) -> Option<Margin> {
-    let radius = view.cutoff.sqrt();
     let Some(lens_pixels) = view.lens_pixels() else {
-        let depth = view.depth_extent(splat, radius);
+        let depth = view.depth_extent(splat, view.radius);
         return margin::without_lens(exact, depth, &view.reach(exact.pixel(), screen), view);
     };
-    let widest = margin::hit_radius(radius);
-    let reach = view.reach(exact.pixel(), &screen_box(splat, widest, view)?);
+    let widest = margin::hit_radius(view.radius);
+    let reach = view.reach(exact.pixel(), &Image::new(splat, exact, widest, view)?.screen);
     Some(margin::with_lens(exact, view.depth_extent(splat, widest), &reach, lens_pixels, view))
 }
 
-/// A splat of the cloud in camera space (L46-69). The camera's position is subtracted in `f64`.
+/// A splat of the cloud in camera space (L46-69).
+#[inline(always)]
 pub fn camera_splat(cloud: &Cloud, index: usize, view: &View) -> CameraSplat {
-    let from_eye = cloud.positions[index].as_dvec3() + (cloud.origin - view.eye);
+    let from_eye = from_eye(cloud, index, view);
     let normal = cloud.normals[index].as_dvec3().normalize();
     let world_axes = world_axes(cloud, index, normal);
     let axes = world_axes.map(|axis| view.linear * axis);
+    let left_handed = match cloud.shapes {
+        Shapes::Discs(_) => false,
+        Shapes::Ellipses(_) => world_axes[0].cross(world_axes[1]).dot(normal) < 0.0,
+    };
     // (A t1) x (A t2) = det(A) A^-T (t1 x t2): it points along the normal unless exactly one of these is mirrored.
-    let mirrored = (view.mirrors) != (world_axes[0].cross(world_axes[1]).dot(normal) < 0.0);
+    let mirrored = view.mirrors != left_handed;
     let cross = axes[0].cross(axes[1]).normalize();
-    let to_viewer = if view.orthographic { -view.world_forward } else { -from_eye };
     CameraSplat {
         center: view.linear * from_eye,
         axes,
         normal: if mirrored { -cross } else { cross },
-        back: cloud.oriented && normal.dot(to_viewer) < 0.0,
+        back: shows_back(cloud, index, from_eye, view),
     }
 }
 
+/// From the eye to a splat, in the world. The camera's position is subtracted in `f64`.
+fn from_eye(cloud: &Cloud, index: usize, view: &View) -> DVec3 {
+    cloud.positions[index].as_dvec3() + (cloud.origin - view.eye)
+}
+
+/// Whether the eye sees the back of a splat, given where that is from the eye.
+fn shows_back(cloud: &Cloud, index: usize, from_eye: DVec3, view: &View) -> bool {
+    let away = if view.orthographic { view.world_forward } else { from_eye };
+    cloud.oriented && cloud.normals[index].as_dvec3().dot(away) > 0.0
+}
+
 /// The sigma-scaled tangent axes of a splat in the world (L54-61).
+#[inline(always)]
 fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 2] {
     match &cloud.shapes {
         Shapes::Discs(sizes) => {
@@ -256,31 +341,19 @@ fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 2] {
     }
 }
 
-/// A vector perpendicular to a unit vector, made with the coordinate axis that is farthest from it.
+/// A vector perpendicular to a unit vector: the product of the coordinate axis that is farthest from it and the vector.
 fn perpendicular(normal: DVec3) -> DVec3 {
-    let [x, y, z] = normal.abs().to_array();
-    let axis = if x <= y && x <= z {
-        DVec3::X
-    } else if y <= z {
-        DVec3::Y
-    } else {
-        DVec3::Z
-    };
-    axis.cross(normal)
-}
-
-/// The back-face cull (L49-52), corrected for the lens: no point of the aperture sees the front (erratum E21).
-fn faces_away(splat: &CameraSplat, view: &View) -> bool {
-    if !splat.back {
-        return false;
-    }
-    let lens_radius = view.lens.map_or(0.0, |lens| lens.radius);
-    -splat.normal.dot(splat.center) + lens_radius * splat.normal.xy().length() < 0.0 || view.orthographic
+    let [x, y, z] = normal.to_array();
+    let [ax, ay, az] = normal.abs().to_array();
+    // Looked up, not branched to: which axis it is cannot be foreseen.
+    let products = [DVec3::new(0.0, -z, y), DVec3::new(z, 0.0, -x), DVec3::new(-y, x, 0.0)];
+    let not_x = ax > ay || ax > az;
+    products[usize::from(not_x) + usize::from(not_x && ay > az)]
 }
 
 /// The exact box of a disc of `radius` sigma as a pinhole sees it: `[x, y]` in pixels (L106-125, corrected). `None` if
 /// the disc is nearer than the near plane.
-fn screen_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 2]> {
+fn exact_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 2]> {
     let side = |axis: usize| {
         let extent = if view.orthographic {
             Some(orthographic_extent(splat, radius, axis))
@@ -297,6 +370,7 @@ fn screen_box(splat: &CameraSplat, radius: f64, view: &View) -> Option<[Extent; 
 
 /// The pixels of the window in which a disc of `radius` sigma with this box may be hit: the box widened by the circle
 /// of confusion and the pixel filter (L137-159, corrected).
+#[inline(always)]
 fn candidates(splat: &CameraSplat, screen: &[Extent; 2], radius: f64, view: &View) -> PixelRect {
     let blur = view.circle_of_confusion(view.depth_extent(splat, radius));
     view.pixels_that_reach(&[0, 1].map(|axis| {
@@ -308,11 +382,10 @@ fn candidates(splat: &CameraSplat, screen: &[Extent; 2], radius: f64, view: &Vie
 /// The factor from the kernel's value to a fragment's weight: area / (|T1 x T2| I), so that the weights of a
 /// closed surface sum to about 1. SPEC section 4. The kernel's own value counts for `disc`, for `over`, and where
 /// no area is known.
-fn weight_scale(cloud: &Cloud, index: usize, options: &RenderOptions) -> f32 {
+fn weight_scale(cloud: &Cloud, index: usize, view: &View, options: &RenderOptions) -> f32 {
     match (&cloud.areas, options.resolve, options.kernel) {
         (Some(areas), Resolve::Surface { .. }, kernel) if kernel != crate::Kernel::Disc => {
-            let scale =
-                f64::from(areas[index]) / (splat_area(cloud, index) * kernel.integral(options.cutoff));
+            let scale = f64::from(areas[index]) / (splat_area(cloud, index) * view.kernel_integral);
             (scale as f32).min(MAX_MAGNITUDE)
         }
         _ => 1.0,
@@ -331,6 +404,7 @@ pub(crate) fn splat_area(cloud: &Cloud, index: usize) -> f64 {
 }
 
 /// What the splat's fragments share: its colour (the listing's splat shader, L161-162), opacity and depth interval.
+#[inline(always)]
 fn surface(
     cloud: &Cloud,
     index: usize,
@@ -345,11 +419,12 @@ fn surface(
             HEADLIGHT_AMBIENT + (1.0 - HEADLIGHT_AMBIENT) * splat.normal.dot(to_viewer).abs()
         }
     };
-    let color = base_color(cloud, index, options.shading).map(|value| {
-        let value = f64::from((value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE));
+    let mut color = base_color(cloud, index, options.shading)
+        .map(|value| (value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE));
+    if options.resolve == Resolve::Over {
         // Trained splats blend in their display space.
-        (if options.resolve == Resolve::Over { srgb::encode(value) } else { value }) as f32
-    });
+        color = color.map(|value| srgb::encode(f64::from(value)) as f32);
+    }
     let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
     SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }
 }
@@ -365,7 +440,7 @@ pub fn base_color(cloud: &Cloud, index: usize, shading: Shading) -> [f32; 3] {
 
 /// [`SplatSurface::interval`]: SPEC section 6, or the listing's (L128-133, corrected: erratum E1).
 fn depth_interval(splat: &CameraSplat, view: &View, options: &RenderOptions) -> [f32; 2] {
-    let extent = half_depth(splat, view.cutoff.sqrt());
+    let extent = half_depth(splat, view.radius);
     if let Resolve::Surface { thickness: Thickness::WholeSplat, .. } = options.resolve {
         return [(splat.center.z - extent) as f32, (splat.center.z + extent) as f32];
     }
@@ -378,32 +453,6 @@ fn depth_interval(splat: &CameraSplat, view: &View, options: &RenderOptions) -> 
     }
     // n.P is the same for every point P of the plane, the reference point among them.
     [(half / splat.normal.dot(splat.center).abs()) as f32, cap as f32]
-}
-
-/// Splat order: by nearest depth, then by the splat's own data, so that the order in the file changes nothing.
-pub fn splat_order(cloud: &Cloud, a: &VisibleSplat, b: &VisibleSplat) -> Ordering {
-    a.nearest.total_cmp(&b.nearest).then_with(|| {
-        let (a, b) = (a.index as usize, b.index as usize);
-        compare(cloud.positions[a], cloud.positions[b])
-            .then_with(|| compare(cloud.normals[a], cloud.normals[b]))
-            .then_with(|| match &cloud.shapes {
-                Shapes::Discs(sizes) => sizes[a].total_cmp(&sizes[b]),
-                Shapes::Ellipses(axes) => {
-                    compare(axes[a][0], axes[b][0]).then_with(|| compare(axes[a][1], axes[b][1]))
-                }
-            })
-            .then_with(|| cloud.colors.as_ref().map_or(Ordering::Equal, |c| compare(c[a], c[b])))
-            .then_with(|| cloud.opacities.as_ref().map_or(Ordering::Equal, |o| o[a].total_cmp(&o[b])))
-            .then_with(|| cloud.areas.as_ref().map_or(Ordering::Equal, |s| s[a].total_cmp(&s[b])))
-            // Equal in everything: interchangeable in the picture, told apart only by the id.
-            .then(a.cmp(&b))
-    })
-}
-
-/// A total order of vectors, component by component.
-fn compare(a: Vec3, b: Vec3) -> Ordering {
-    let pairs = a.to_array().into_iter().zip(b.to_array());
-    pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
 /// The shape of a splat as a measure of distance from its centre.

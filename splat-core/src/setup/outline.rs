@@ -1,5 +1,6 @@
-//! An ellipse around all places of the picture from which a splat may be hit, for whoever visits row by row.
+//! The ellipse that a splat is in the picture: its box, and for whoever visits row by row its outline.
 
+use super::bounds::Extent;
 use crate::evaluate::SplatConstants;
 
 /// Below this, 1 - (half depth / depth)^2 tells of a splat that reaches to the camera plane: no ellipse is worth its while.
@@ -11,7 +12,7 @@ const MAX_REACH: f64 = 4096.0;
 /// An ellipse on the picture, in pixels relative to the corner of the splat's pixel (xi, yi).
 ///
 /// It holds every sample position from which the splat may be hit, through any point of the lens, in `f32` as in exact
-/// arithmetic: the projection of the disc whose box are the candidates (see [`super::margin`]), widened by the circle
+/// arithmetic: the projection of the disc whose box are the candidates (see `setup/margin.rs`), widened by the circle
 /// of confusion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outline {
@@ -37,22 +38,48 @@ impl Outline {
         narrowing: 1.0,
     };
 
-    /// The outline of a disc of `radius` sigma, widened by a circle of confusion of the radii `blur`, in pixels.
-    pub fn new(
-        constants: &SplatConstants<f64>,
-        orthographic: bool,
-        radius: f64,
-        blur: [f64; 2],
-    ) -> Self {
-        Self::ellipse(constants, orthographic, radius, blur).unwrap_or(Self::EVERYTHING)
+    /// The outline of a disc whose picture is `ellipse`, widened by a circle of confusion of the radii `blur`, in pixels.
+    /// (`xf`, `yf`) is the place of the splat's centre in its pixel.
+    #[inline(always)]
+    pub(super) fn new(ellipse: &Ellipse, [xf, yf]: [f64; 2], blur: [f64; 2]) -> Self {
+        let Ellipse { center, half, sxy, determinant } = ellipse.widened(blur);
+        let [half_width, half_height] = half;
+        let reach = (center[0].abs() + half_width).max(center[1].abs() + half_height);
+        if !(reach < MAX_REACH && half_height > 0.0 && half_width > 0.0) {
+            return Self::EVERYTHING;
+        }
+        let inverse_product = 1.0 / (half_width * half_height);
+        Self {
+            center: [(xf + center[0]) as f32, (yf + center[1]) as f32],
+            half_width: half_width as f32,
+            inverse_half_height: (half_width * inverse_product) as f32,
+            correlation: (sxy * inverse_product) as f32,
+            narrowing: (determinant.sqrt() * inverse_product).min(1.0) as f32,
+        }
     }
 
-    fn ellipse(
-        constants: &SplatConstants<f64>,
-        orthographic: bool,
-        radius: f64,
-        blur: [f64; 2],
-    ) -> Option<Self> {
+    /// Whether it excludes anything.
+    pub fn is_known(&self) -> bool {
+        self.half_width.is_finite()
+    }
+}
+
+/// The picture of a disc that keeps clear of the camera plane: the ellipse (x - center)^T S^-1 (x - center) <= 1, in
+/// pixels relative to the picture of the disc's centre.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ellipse {
+    center: [f64; 2],
+    /// sqrt(Sxx) and sqrt(Syy): half of its width and height.
+    half: [f64; 2],
+    sxy: f64,
+    /// det S.
+    determinant: f64,
+}
+
+impl Ellipse {
+    /// The picture of a disc of `radius` sigma. `None` if it reaches to the camera plane or nearly so.
+    #[inline(always)]
+    pub(super) fn new(constants: &SplatConstants<f64>, orthographic: bool, radius: f64) -> Option<Self> {
         if !constants.centred {
             return None;
         }
@@ -61,7 +88,8 @@ impl Outline {
         let q = 1.0 / constants.a1;
         let m = 1.0 / constants.b[0];
         let p = -constants.b[1] * q * m;
-        let slope = constants.depth_slope.map(|s| if orthographic { 0.0 } else { s / constants.depth });
+        let per_depth = if orthographic { 0.0 } else { 1.0 / constants.depth };
+        let slope = constants.depth_slope.map(|slope| slope * per_depth);
         let square = radius * radius;
         let clearance = 1.0 - square * (slope[0] * slope[0] + slope[1] * slope[1]);
         if clearance < LEAST_CLEARANCE {
@@ -69,39 +97,49 @@ impl Outline {
         }
         // A line x = const touches the picture where x^2 (1 - R^2 slope^2) + 2 x R^2 Jx.slope - R^2 Jx^2 = 0, with the row
         // Jx of J: so its centre, and S = (R^2 J J^T + centre centre^T (1 - R^2 slope^2)) / (1 - R^2 slope^2).
-        let scale = square / clearance;
+        let inverse_clearance = 1.0 / clearance;
+        let scale = square * inverse_clearance;
         let center = [-scale * (p * slope[0] + m * slope[1]), -scale * q * slope[0]];
         let sxx = scale * (p * p + m * m) + center[0] * center[0];
         let syy = scale * q * q + center[1] * center[1];
-        let sxy = scale * p * q + center[0] * center[1];
-        // det S without its cancellation.
-        let determinant = scale * scale * (q * m) * (q * m) / clearance;
-
-        // The sum of two ellipses lies within that of the matrix (1 + 1/t) S + (1 + t) B, for any t > 0; this t makes
-        // its trace least.
-        let [bxx, byy] = blur.map(|blur| blur * blur);
-        let ratio = ((sxx + syy) / (bxx + byy)).sqrt();
-        let (grow, widen) = if bxx + byy > 0.0 { (1.0 + 1.0 / ratio, 1.0 + ratio) } else { (1.0, 0.0) };
-        let [xx, yy] = [grow * sxx + widen * bxx, grow * syy + widen * byy];
-        let determinant = grow * grow * determinant
-            + grow * widen * (sxx * byy + syy * bxx)
-            + widen * widen * bxx * byy;
-        let [half_width, half_height] = [xx.sqrt(), yy.sqrt()];
-        let reach = (center[0].abs() + half_width).max(center[1].abs() + half_height);
-        if !(reach < MAX_REACH && half_height > 0.0 && half_width > 0.0) {
-            return None;
-        }
         Some(Self {
-            center: [(constants.xf + center[0]) as f32, (constants.yf + center[1]) as f32],
-            half_width: half_width as f32,
-            inverse_half_height: (1.0 / half_height) as f32,
-            correlation: (grow * sxy / (half_width * half_height)) as f32,
-            narrowing: ((determinant / (xx * yy)).sqrt().min(1.0)) as f32,
+            center,
+            half: [sxx.sqrt(), syy.sqrt()],
+            sxy: scale * p * q + center[0] * center[1],
+            // Without the cancellation of sxx syy - sxy^2.
+            determinant: scale * scale * (q * m) * (q * m) * inverse_clearance,
         })
     }
 
-    /// Whether it excludes anything.
-    pub fn is_known(&self) -> bool {
-        self.half_width.is_finite()
+    /// Its box, given the picture of the disc's centre.
+    #[inline(always)]
+    pub(super) fn extents(&self, from: [f64; 2]) -> [Extent; 2] {
+        [0, 1].map(|axis| {
+            let center = from[axis] + self.center[axis];
+            Extent { min: center - self.half[axis], max: center + self.half[axis] }
+        })
+    }
+
+    /// An ellipse around the sum of this one and a circle of confusion of the radii `blur`, in pixels.
+    #[inline(always)]
+    fn widened(&self, blur: [f64; 2]) -> Self {
+        let [bxx, byy] = blur.map(|blur| blur * blur);
+        let sharp = bxx + byy == 0.0;
+        if sharp {
+            return *self;
+        }
+        // The sum of two ellipses lies within that of the matrix (1 + 1/t) S + (1 + t) B, for any t > 0; this t makes
+        // its trace least.
+        let [sxx, syy] = self.half.map(|half| half * half);
+        let ratio = ((sxx + syy) / (bxx + byy)).sqrt();
+        let [grow, widen] = [1.0 + 1.0 / ratio, 1.0 + ratio];
+        Self {
+            center: self.center,
+            half: [(grow * sxx + widen * bxx).sqrt(), (grow * syy + widen * byy).sqrt()],
+            sxy: grow * self.sxy,
+            determinant: grow * grow * self.determinant
+                + grow * widen * (sxx * byy + syy * bxx)
+                + widen * widen * bxx * byy,
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! The splat-centred constants of a splat: SPEC section 3, notes 3.4; they replace L86-106.
 
 use super::bounds::{deep_reference, half_depth};
+use super::view::floor;
 use super::{CameraSplat, View};
 use crate::evaluate::SplatConstants;
 use glam::{DVec2, Vec3Swizzles};
@@ -14,10 +15,11 @@ const MAX_PIXEL: f64 = (1u64 << 30) as f64;
 /// The constants of a splat, exact to `f64`. `None` if it is seen edge-on.
 ///
 /// [`SplatConstants::edge_on`] is left at 0; the margin of the candidates' box decides it.
+#[inline(always)]
 pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> {
     let [t1, t2] = splat.axes;
     let scale = view.pixel_scale;
-    let radius = view.cutoff.sqrt();
+    let radius = view.radius;
     let deep =
         if view.orthographic { None } else { deep_reference(splat, radius, half_depth(splat, radius)) };
     let [u, v] = deep.unwrap_or([0.0; 2]);
@@ -31,7 +33,7 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
         (screen, [t1, t2].map(|t| (t.xy() - screen * t.z) * scale / point.z))
     };
     let determinant = rows[0].perp_dot(rows[1]);
-    let has_area = determinant.abs() > EDGE_ON * rows[0].length() * rows[1].length();
+    let has_area = determinant.abs() > EDGE_ON * (rows[0].length_squared() * rows[1].length_squared()).sqrt();
     if !has_area {
         return None;
     }
@@ -53,17 +55,16 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
     };
 
     let pixel = screen * scale + view.principal_point;
-    let whole: DVec2 = (pixel + 0.5).floor();
-    let fits = whole.abs().max_element() < MAX_PIXEL;
+    let fits = pixel.abs().max_element() < MAX_PIXEL;
     if !fits {
         return None;
     }
-    let fraction = pixel - whole;
+    let [xi, yi] = [floor(pixel.x + 0.5), floor(pixel.y + 0.5)];
     Some(SplatConstants {
-        xi: whole.x as i32,
-        yi: whole.y as i32,
-        xf: fraction.x,
-        yf: fraction.y,
+        xi,
+        yi,
+        xf: pixel.x - f64::from(xi),
+        yf: pixel.y - f64::from(yi),
         h,
         a1,
         b,

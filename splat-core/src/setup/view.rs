@@ -2,7 +2,7 @@
 
 use super::bounds::{Extent, half_depth};
 use super::{BOX_PADDING, CameraSplat};
-use crate::{Camera, Lens, PixelRect, RenderOptions};
+use crate::{Camera, Cloud, Lens, PixelRect, RenderOptions, Shapes};
 use glam::{DMat3, DVec2, DVec3, DVec4, Vec4Swizzles};
 
 /// A camera as set-up sees it.
@@ -30,12 +30,18 @@ pub struct View {
     pub far: f64,
     /// F.
     pub cutoff: f64,
+    /// R = sqrt(F): the radius of the splats, in sigma.
+    pub radius: f64,
+    /// The kernel's integral over them.
+    pub kernel_integral: f64,
     /// Radius of the pixel filter, in pixels.
     pub filter_radius: f64,
     /// Width and height of the full frame, in pixels.
     pub frame: [u32; 2],
     /// The pixels to render.
     pub window: PixelRect,
+    /// How the depth grows in the world's directions.
+    depth_gradient: DVec3,
     clip_planes: Vec<DVec4>,
 }
 
@@ -58,9 +64,12 @@ impl View {
             near: camera.near,
             far: camera.far,
             cutoff: options.cutoff,
+            radius: options.cutoff.sqrt(),
+            kernel_integral: options.kernel.integral(options.cutoff),
             filter_radius: options.filter.radius(),
             frame: [camera.width, camera.height],
             window: options.window.map_or(frame, |window| window.intersect(&frame)),
+            depth_gradient: linear.row(2),
             clip_planes: camera.clip_planes.iter().map(|&plane| to_camera * plane).collect(),
         }
     }
@@ -75,17 +84,40 @@ impl View {
         self.near * (1.0 - 1.0 / 65_536.0)
     }
 
-    /// Whether the splat lies wholly outside one of the planes: near, far, and the caller's (L71-84).
-    pub(super) fn is_clipped(&self, splat: &CameraSplat, radius: f64) -> bool {
-        let extent = half_depth(splat, radius);
-        splat.center.z + extent <= self.near
-            || splat.center.z - extent >= self.far
-            || self.clip_planes.iter().any(|plane| {
-                // The listing's exact test of a disc against a plane, the axes being sigma-scaled (Q = 1).
-                let [a, b] = splat.axes.map(|axis| plane.xyz().dot(axis));
-                let c = plane.xyz().dot(splat.center) + plane.w;
-                c < 0.0 && radius * radius * (a * a + b * b) < c * c
-            })
+    /// The depth extent per sigma, |t|, of a splat of the cloud.
+    pub(super) fn steepness(&self, cloud: &Cloud, index: usize) -> f64 {
+        match &cloud.shapes {
+            // |t| is the length of the depth's gradient along the plane of the disc.
+            Shapes::Discs(sizes) => {
+                let normal = cloud.normals[index].as_dvec3();
+                let squared = self.depth_gradient.cross(normal).length_squared() / normal.length_squared();
+                f64::from(sizes[index]) * squared.sqrt()
+            }
+            Shapes::Ellipses(axes) => {
+                let [t1, t2] = axes[index].map(|axis| self.depth_gradient.dot(axis.as_dvec3()));
+                (t1 * t1 + t2 * t2).sqrt()
+            }
+        }
+    }
+
+    /// Whether a splat lies wholly outside the near or the far plane (L71-84).
+    pub(super) fn is_out_of_depth(&self, depth: f64, half_depth: f64) -> bool {
+        depth + half_depth <= self.near || depth - half_depth >= self.far
+    }
+
+    /// Whether there are planes besides near and far.
+    pub(super) fn has_clip_planes(&self) -> bool {
+        !self.clip_planes.is_empty()
+    }
+
+    /// Whether a splat lies wholly outside one of the caller's planes: the listing's exact test of a disc against a
+    /// plane, the axes being sigma-scaled (Q = 1).
+    pub(super) fn is_clipped(&self, splat: &CameraSplat) -> bool {
+        self.clip_planes.iter().any(|plane| {
+            let [a, b] = splat.axes.map(|axis| plane.xyz().dot(axis));
+            let c = plane.xyz().dot(splat.center) + plane.w;
+            c < 0.0 && self.cutoff * (a * a + b * b) < c * c
+        })
     }
 
     /// The depths of the visible part of a disc of `radius` sigma.
@@ -125,9 +157,9 @@ impl View {
     /// filter's radius of i + 1/2.
     pub(super) fn pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let room = self.filter_radius + BOX_PADDING;
-        // Casts saturate, and the window is far smaller than their range.
-        let first = |extent: Extent| (extent.min - room - 0.5).ceil() as i32;
-        let end = |extent: Extent| ((extent.max + room - 0.5).floor() as i32).saturating_add(1);
+        // Integers saturate, and the window is far smaller than their range.
+        let first = |extent: Extent| floor(room + 0.5 - extent.min).saturating_neg();
+        let end = |extent: Extent| floor(extent.max + room - 0.5).saturating_add(1);
         let [x, y] = *screen;
         PixelRect::new(first(x), first(y), end(x), end(y)).intersect(&self.window)
     }
@@ -141,4 +173,11 @@ pub(crate) struct Reach {
     pub of_splat: [f64; 2],
     /// Of samples in the frame that a pinhole's hit may have.
     pub in_frame: [f64; 2],
+}
+
+/// The greatest integer not above a number, as far as there are integers. (`f64::floor` is a call where the processor's
+/// oldest ancestors lack it.)
+pub(super) fn floor(value: f64) -> i32 {
+    let truncated = value as i32;
+    if f64::from(truncated) > value { truncated.saturating_sub(1) } else { truncated }
 }
