@@ -104,7 +104,8 @@ impl Polynomials {
                 bin as f64 + 0.5 - 0.5 * libm::cos((2.0 * i as f64 + 1.0) * PI / (2.0 * count as f64))
             };
             let points: Vec<f64> = (0..count).map(point).collect();
-            let value = |x: &f64| kernel.value((x / f64::from(scale)).min(cutoff * (1.0 - f64::EPSILON)), cutoff);
+            let value =
+                |x: &f64| kernel.value((x / f64::from(scale)).min(cutoff * (1.0 - f64::EPSILON)), cutoff);
             let values = points.iter().map(value).collect();
             interpolate(&points, values)
         });
@@ -249,7 +250,9 @@ mod tests {
                     let degree = KernelTable::new(kernel, cutoff, mode).polynomials.unwrap().degree;
                     let bound = Polynomials::error_bound(kernel, cutoff, degree);
                     let error = largest_error(kernel, cutoff, mode);
-                    println!("{kernel:?} F={cutoff} {mode:?} degree {degree}: {error:.2e}, bound {bound:.2e}");
+                    println!(
+                        "{kernel:?} F={cutoff} {mode:?} degree {degree}: {error:.2e}, bound {bound:.2e}"
+                    );
                     assert!(error <= bound + rounding, "{kernel:?} F={cutoff} {mode:?}: {error}");
                     // No looser than need be: the next lower degree would not do.
                     if mode == TableMode::Poly8 {

@@ -83,12 +83,7 @@ impl<L: Lanes> LaneSplat<L> {
 
     /// [`SplatConstants::thin_lens`] for a sample and a lens point `p` a lane.
     #[inline(always)]
-    pub fn thin_lens<const PLAIN: bool>(
-        &self,
-        d: [L; 2],
-        p: [L; 2],
-        limits: &LaneLimits<L>,
-    ) -> LaneHits<L> {
+    pub fn thin_lens<const PLAIN: bool>(&self, d: [L; 2], p: [L; 2], limits: &LaneLimits<L>) -> LaneHits<L> {
         let m = [d[0] + p[0] * self.defocus, d[1] + p[1] * self.defocus];
         let side = L::splat(1.0) - (self.lens_slope[0] * p[0] + self.lens_slope[1] * p[1]);
         let g = side + (self.h[0] * m[0] + self.h[1] * m[1]);
@@ -108,9 +103,7 @@ impl<L: Lanes> LaneSplat<L> {
         let v = self.reference[1] + (self.b[0] * d[0] + self.b[1] * d[1]);
         let r2 = u * u + v * v;
         let depth = self.depth + (self.depth_slope[0] * u + self.depth_slope[1] * v);
-        let missed = r2.not_less(limits.cutoff)
-            | limits.near.not_less(depth)
-            | depth.not_less(limits.far);
+        let missed = r2.not_less(limits.cutoff) | limits.near.not_less(depth) | depth.not_less(limits.far);
         LaneHits { missed, flipped: L::splat(0.0), r2, depth }
     }
 

@@ -143,13 +143,15 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         if FORM == THIN_LENS && self.splat.flips {
             // Once for each side: few splats stand so that the lens sees both.
             if !(self.culls && back) {
-                self.side::<FORM, PLAIN, SAME_SIDE>(list, &mut page, back);
+                self.side::<FORM, PLAIN, true, SAME_SIDE>(list, &mut page, back);
             }
             if !(self.culls && !back) {
-                self.side::<FORM, PLAIN, OTHER_SIDE>(list, &mut page, !back);
+                self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, &mut page, !back);
             }
-        } else if !(self.culls && back) {
-            self.side::<FORM, PLAIN, ANY_SIDE>(list, &mut page, back);
+        } else if FORM == THIN_LENS && !(self.culls && back) {
+            self.side::<FORM, PLAIN, true, ANY_SIDE>(list, &mut page, back);
+        } else if FORM != THIN_LENS {
+            self.side::<FORM, PLAIN, false, ANY_SIDE>(list, &mut page, back);
         }
         let fragments = self.weigh(page.records());
         page.close(fragments);
@@ -158,72 +160,90 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Turns the r2 of some records into weights, and drops what weighs nothing. Returns the number of fragments left.
     ///
     /// Not at once where the hits are found: this way neither loop is so long that the processor sees only one cell of it
-    /// at a time, and only what is hit is weighed.
+    /// at a time.
     #[inline(always)]
     fn weigh(&self, records: &mut [Record]) -> u32 {
-        let mut fragments = 0;
-        let mut pairs = records.chunks_exact_mut(L::CELLS);
-        for pair in &mut pairs {
-            if let [first, second] = pair {
+        let count = records.len() * LANES;
+        // Of each lane, exact as long as a splat has fewer than 2^24 records.
+        let mut misses = L::splat(0.0);
+        let (pairs, last) = records.as_chunks_mut::<2>();
+        if L::CELLS == 2 {
+            for [first, second] in pairs {
                 let depth = L::load_cells(&first.depth, &second.depth);
                 let weight = L::load_cells(&first.weight, &second.weight);
-                let (depth, weight, missed) = self.weighed(depth, weight);
+                let (depth, weight) = self.weighed(depth, weight, &mut misses);
                 depth.store_cell::<0>(&mut first.depth);
                 depth.store_cell::<1>(&mut second.depth);
                 weight.store_cell::<0>(&mut first.weight);
                 weight.store_cell::<1>(&mut second.weight);
-                fragments += (missed.bits() as u16).count_zeros();
-            } else if let [record] = pair {
-                fragments += self.weigh_one(record);
+            }
+        } else {
+            for [first, second] in pairs {
+                self.weigh_one(first, &mut misses);
+                self.weigh_one(second, &mut misses);
             }
         }
-        if let [record] = pairs.into_remainder() {
-            fragments += self.weigh_one(record);
+        let mut sums = [[0.0; LANES]; 2];
+        misses.store_cell::<0>(&mut sums[0]);
+        if L::CELLS == 2 {
+            misses.store_cell::<1>(&mut sums[1]);
         }
-        fragments
+        if let [record] = last {
+            let mut misses = L::splat(0.0);
+            self.weigh_one(record, &mut misses);
+            let mut last = [0.0; LANES];
+            misses.store_cell::<0>(&mut last);
+            sums[0] = std::array::from_fn(|lane| sums[0][lane] + last[lane]);
+        }
+        (count as u32) - sums.as_flattened().iter().sum::<f32>() as u32
     }
 
     /// [`Self::weigh`] for one record.
     #[inline(always)]
-    fn weigh_one(&self, record: &mut Record) -> u32 {
-        let (depth, weight, missed) = self.weighed(L::load(&record.depth), L::load(&record.weight));
+    fn weigh_one(&self, record: &mut Record, misses: &mut L) {
+        let (depth, weight) = self.weighed(L::load(&record.depth), L::load(&record.weight), misses);
         depth.store_cell::<0>(&mut record.depth);
         weight.store_cell::<0>(&mut record.weight);
-        (missed.bits() as u8).count_zeros()
     }
 
-    /// Depth, weight, and whether there is no fragment, given depths (not numbers where there is none) and r2.
+    /// Depth and weight, given depths (not numbers where there is none) and r2. Adds to `misses` where there is none.
     #[inline(always)]
-    fn weighed(&self, depth: L, r2: L) -> (L, L, L) {
+    fn weighed(&self, depth: L, r2: L, misses: &mut L) -> (L, L) {
         let missed = depth.not_less_or_equal(L::splat(f32::INFINITY));
         let weight = self.weight_scale * self.table.kernel(r2, missed);
         let missed = missed | L::splat(0.0).not_less(weight);
-        (depth | missed, weight.and_not(missed), missed)
+        *misses = *misses + (missed & L::splat(1.0));
+        (depth | missed, weight.and_not(missed))
     }
 
     /// Tests all samples of a list of pixels, and takes the hits of `SIDE`, which see the back of the splat or its front.
     #[inline(always)]
-    fn side<const FORM: u8, const PLAIN: bool, const SIDE: u8>(
+    fn side<const FORM: u8, const PLAIN: bool, const SPARSE: bool, const SIDE: u8>(
         &self,
         list: &PlaceList,
         page: &mut Page<'_>,
         back: bool,
     ) {
+        let patterns = self.samples.patterns();
         for group in 0..self.samples.groups() {
-            let samples = self.samples.group(group);
-            let mut column = page.column(group, back);
-            let mut pairs = list.places().chunks_exact(L::CELLS);
-            for places in &mut pairs {
-                let places = [places[0], places[L::CELLS - 1]];
-                let hits = self.hits::<FORM, PLAIN, SIDE>(list, samples, places);
-                column.put::<L, 0>(places[0], &hits);
-                if L::CELLS == 2 {
-                    column.put::<L, 1>(places[1], &hits);
+            let source = Source { list, patterns, samples: self.samples.group(group) };
+            let mut column = page.column(group, back, list.places().len());
+            let (pairs, last) = list.places().as_chunks::<2>();
+            if L::CELLS == 2 {
+                for &places in pairs {
+                    let hits = self.hits::<FORM, PLAIN, SIDE>(&source, places);
+                    column.put::<L, SPARSE, 0>(places[0], &hits);
+                    column.put::<L, SPARSE, 1>(places[1], &hits);
                 }
-            }
-            if let [place] = pairs.remainder() {
-                let hits = self.hits::<FORM, PLAIN, SIDE>(list, samples, [*place; 2]);
-                column.put::<L, 0>(*place, &hits);
+                if let &[place] = last {
+                    let hits = self.hits::<FORM, PLAIN, SIDE>(&source, [place; 2]);
+                    column.put::<L, SPARSE, 0>(place, &hits);
+                }
+            } else {
+                for &place in list.places() {
+                    let hits = self.hits::<FORM, PLAIN, SIDE>(&source, [place; 2]);
+                    column.put::<L, SPARSE, 0>(place, &hits);
+                }
             }
             column.close();
         }
@@ -233,11 +253,10 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     #[inline(always)]
     fn hits<const FORM: u8, const PLAIN: bool, const SIDE: u8>(
         &self,
-        list: &PlaceList,
-        samples: &GroupSamples,
+        source: &Source<'_>,
         places: [u16; 2],
     ) -> LaneHits<L> {
-        let mut hits = self.evaluate::<FORM, PLAIN>(list, samples, places);
+        let mut hits = self.evaluate::<FORM, PLAIN>(source, places);
         match SIDE {
             SAME_SIDE => hits.missed = hits.missed | hits.flipped,
             OTHER_SIDE => hits.missed = hits.missed.or_not(hits.flipped),
@@ -250,15 +269,12 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     #[inline(always)]
     fn evaluate<const FORM: u8, const PLAIN: bool>(
         &self,
-        list: &PlaceList,
-        samples: &GroupSamples,
+        source: &Source<'_>,
         [first, second]: [u16; 2],
     ) -> LaneHits<L> {
-        let patterns = self.samples.patterns();
-        let (pattern_a, pattern_b) =
-            (patterns[usize::from(first) % PLACES], patterns[usize::from(second) % PLACES]);
-        let (jitter_a, jitter_b) = (samples.jitter(pattern_a), samples.jitter(pattern_b));
-        let (offset_a, offset_b) = (list.offset(first), list.offset(second));
+        let (pattern_a, pattern_b) = (source.pattern(first), source.pattern(second));
+        let (jitter_a, jitter_b) = (source.samples.jitter(pattern_a), source.samples.jitter(pattern_b));
+        let (offset_a, offset_b) = (source.list.offset(first), source.list.offset(second));
         let jitter = [
             L::load_cells(&jitter_a[0], &jitter_b[0]) + self.minus_fraction[0],
             L::load_cells(&jitter_a[1], &jitter_b[1]) + self.minus_fraction[1],
@@ -270,12 +286,27 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         match FORM {
             PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
             THIN_LENS => {
-                let (a, b) = (samples.lens(pattern_a), samples.lens(pattern_b));
+                let (a, b) = (source.samples.lens(pattern_a), source.samples.lens(pattern_b));
                 let p = [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])];
                 self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
             }
             _ => self.lane_splat.orthographic(d, &self.limits),
         }
+    }
+}
+
+/// Where the samples of a group are found.
+struct Source<'a> {
+    list: &'a PlaceList,
+    patterns: &'a [[u8; 2]; PLACES],
+    samples: &'a GroupSamples,
+}
+
+impl Source<'_> {
+    /// The patterns of a place.
+    #[inline(always)]
+    fn pattern(&self, place: u16) -> [u8; 2] {
+        self.patterns[usize::from(place) % PLACES]
     }
 }
 

@@ -246,16 +246,18 @@ pub struct Column<'a> {
 }
 
 impl Page<'_> {
-    /// Where the hits of a group of samples go, on a side.
+    /// Where the hits of a group of samples go, on a side: at most `cells` cells.
     #[inline(always)]
-    pub fn column(&mut self, group: usize, back: bool) -> Column<'_> {
+    pub fn column(&mut self, group: usize, back: bool, cells: usize) -> Column<'_> {
         let list = if self.sides == 2 && back { self.groups + group } else { group };
+        // One more is written than kept.
+        let room = self.count..self.count + cells + 1;
         Column {
-            keys: &mut self.keys[..self.records.len()],
-            records: self.records,
+            keys: &mut self.keys[room.clone()],
+            records: &mut self.records[room],
             counts: &mut self.lists[list],
             key: Key::new((list * PLACES) as u32, LocalSplat::new(self.number, back)),
-            count: self.count,
+            count: 0,
             total: &mut self.count,
         }
     }
@@ -276,15 +278,18 @@ impl Page<'_> {
 
 impl Column<'_> {
     /// Takes the hits in a place: `CELL` of the lanes. For the time being their r2 stand in place of their weights.
+    ///
+    /// If `SPARSE` a cell without a hit leaves no record. If not it leaves an empty one: a few of them cost less than to wait
+    /// for the hits before the place of the next record is known.
     #[inline(always)]
-    pub fn put<L: Lanes, const CELL: usize>(&mut self, place: u16, hits: &LaneHits<L>) {
-        // Written in any case, but kept only if something was hit: a branch would be mispredicted at every rim.
+    pub fn put<L: Lanes, const SPARSE: bool, const CELL: usize>(&mut self, place: u16, hits: &LaneHits<L>) {
+        // Written in any case: a branch would be mispredicted at every rim.
         let record = &mut self.records[self.count];
         (hits.depth | hits.missed).store_cell::<CELL>(&mut record.depth);
         hits.r2.store_cell::<CELL>(&mut record.weight);
         self.keys[self.count] = Key(self.key.0 | u64::from(place));
         let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
-        let kept = u32::from(misses != u8::MAX);
+        let kept = if SPARSE { u32::from(misses != u8::MAX) } else { 1 };
         self.counts[usize::from(place) % PLACES] += kept;
         self.count += kept as usize;
     }
@@ -292,6 +297,6 @@ impl Column<'_> {
     /// Ends the column.
     #[inline(always)]
     pub fn close(self) {
-        *self.total = self.count;
+        *self.total += self.count;
     }
 }

@@ -160,7 +160,9 @@ impl Renderer {
         let picture = Picture::new(cloud, camera, options, &frame, self.level);
         let counts: Vec<Statistics> = self.threads.install(|| {
             let tiles = (0..tiles.len()).into_par_iter().map(|tile| tiles.get(tile));
-            tiles.map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, &region, ranks))).collect()
+            tiles
+                .map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, &region, ranks)))
+                .collect()
         });
         for count in &counts {
             add(&mut statistics, count);
@@ -352,8 +354,11 @@ impl<'a> Picture<'a> {
                     let number = sample - range.start;
                     let cell = records.cell(place_of(x, y), number / LANES);
                     fragments.clear();
-                    fragments
-                        .extend(cell.into_iter().flatten().filter_map(|&entry| records.fragment(entry, number % LANES)));
+                    fragments.extend(
+                        cell.into_iter()
+                            .flatten()
+                            .filter_map(|&entry| records.fragment(entry, number % LANES)),
+                    );
                     let place = SamplePlace { x, y, sample };
                     pixels.add(place, fragments, self.frame.rasterizer.samples());
                 }

@@ -103,7 +103,8 @@ impl Lanes for Avx512 {
     fn store_cell<const CELL: usize>(self, to: &mut Eight) {
         // SAFETY: see the module's documentation; the array is as long as half of the register.
         unsafe {
-            let half = if CELL == 0 { _mm512_castps512_ps256(self.0) } else { _mm512_extractf32x8_ps::<1>(self.0) };
+            let half =
+                if CELL == 0 { _mm512_castps512_ps256(self.0) } else { _mm512_extractf32x8_ps::<1>(self.0) };
             _mm256_storeu_ps(to.as_mut_ptr(), half);
         }
     }
