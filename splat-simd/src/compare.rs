@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
 use crate::raster::{RasterFrame, RasterJob};
-use crate::records::RecordBuffer;
+use crate::records::{RecordBuffer, cell_of};
 use crate::render::set_up;
 use crate::samples::LaneSamples;
 use splat_abuffer::Fragment;
@@ -75,7 +75,7 @@ impl<'a> SplatBySplat<'a> {
         self.records.group();
         let cells = (0..PLACES as u16).flat_map(|place| (0..groups).map(move |group| (place, group)));
         for (pixel, group) in cells {
-            let [entries, _] = self.records.cell(pixel, group);
+            let [entries, _] = self.records.cell(cell_of(pixel, group));
             let [column, row] = pixel_of(pixel);
             for lane in (0..LANES).filter(|_| !entries.is_empty()) {
                 let sample = first + group * LANES + lane;

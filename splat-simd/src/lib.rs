@@ -7,6 +7,7 @@
 mod compare;
 mod evaluate;
 mod lanes;
+mod lattice;
 mod places;
 mod raster;
 mod records;

@@ -2,7 +2,8 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Kernel, LANES, Lanes, prefetch};
-use crate::places::{PLACES, PlaceList};
+use crate::lattice::Lattice;
+use crate::places::{PLACES, PlaceList, TILE};
 use crate::records::{Page, Record, RecordBuffer};
 use crate::samples::{GroupSamples, LaneSamples, limits};
 use splat_abuffer::SplatSurface;
@@ -108,6 +109,68 @@ impl RasterJob<'_> {
     }
 }
 
+/// [`RasterJob`] by lens points: for a frame with a lens.
+#[derive(Debug)]
+pub struct LatticeJob<'a> {
+    /// As [`RasterJob::frame`].
+    pub frame: RasterFrame<'a>,
+    /// The cells.
+    pub lattice: &'a Lattice,
+    /// As [`RasterJob::ranks`].
+    pub ranks: &'a [u32],
+    /// The pixels; they lie within one tile.
+    pub region: PixelRect,
+    /// Where the fragments go.
+    pub records: &'a mut RecordBuffer,
+    /// Scratch.
+    pub cells: &'a mut Vec<u32>,
+}
+
+impl Kernel for LatticeJob<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> u64 {
+        let table = self.frame.rasterizer.table();
+        match table.polynomials() {
+            None => self.rasterize::<L, _>(table),
+            Some(polynomials) => match polynomials.degree {
+                2 => self.rasterize::<L, _>(&OfDegree::<2>(polynomials)),
+                3 => self.rasterize::<L, _>(&OfDegree::<3>(polynomials)),
+                _ => self.rasterize::<L, _>(&OfDegree::<4>(polynomials)),
+            },
+        }
+    }
+}
+
+impl LatticeJob<'_> {
+    #[inline(always)]
+    fn rasterize<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
+        let Self { frame, lattice, ranks, region, records, cells } = self;
+        let corner = [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)];
+        let partial = region.area() < PLACES;
+        let mut tests = 0;
+        for (i, &rank) in ranks.iter().enumerate() {
+            if let Some(&next) = ranks.get(i + AHEAD) {
+                prefetch(&frame.splats[next as usize]);
+                prefetch(&frame.surfaces[next as usize]);
+            }
+            let splat = &frame.splats[rank as usize];
+            lattice.list::<L>(splat, corner, cells);
+            let Some(page) = records.begin(rank, &frame.surfaces[rank as usize], cells.len()) else { break };
+            tests += (cells.len() * LANES) as u64;
+            let clip = partial.then_some(&region);
+            let splat = Evaluation::<L, T>::new(&frame, splat, table);
+            if splat.splat.plain {
+                splat.rasterize_cells::<true>(lattice, cells, corner, clip, page);
+            } else {
+                splat.rasterize_cells::<false>(lattice, cells, corner, clip, page);
+            }
+        }
+        tests
+    }
+}
+
 /// A splat ready to be evaluated in a frame.
 struct Evaluation<'a, L, T> {
     samples: &'a LaneSamples,
@@ -145,13 +208,46 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
             if !(self.culls && back) {
                 self.side::<FORM, PLAIN, true, SAME_SIDE>(list, &mut page, back);
             }
-            if !(self.culls && !back) {
+            if back || !self.culls {
                 self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, &mut page, !back);
             }
         } else if FORM == THIN_LENS && !(self.culls && back) {
             self.side::<FORM, PLAIN, true, ANY_SIDE>(list, &mut page, back);
         } else if FORM != THIN_LENS {
             self.side::<FORM, PLAIN, false, ANY_SIDE>(list, &mut page, back);
+        }
+        let fragments = self.weigh(page.records());
+        page.close(fragments);
+    }
+
+    /// Tests the samples of a list of cells of a tile, given by its first pixel; of the pixels of `clip` alone, if given.
+    #[inline(always)]
+    fn rasterize_cells<const PLAIN: bool>(
+        &self,
+        lattice: &Lattice,
+        cells: &[u32],
+        corner: [i32; 2],
+        clip: Option<&PixelRect>,
+        mut page: Page<'_>,
+    ) {
+        let back = self.splat.back;
+        for &cell in cells {
+            let (d, p) = lattice.offset::<L>(cell, self.splat, corner, &self.minus_fraction);
+            let mut hits = self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits);
+            if let Some(region) = clip {
+                lattice.clip(cell, corner, region, &mut hits);
+            }
+            if self.splat.flips {
+                let mut others = hits;
+                others.missed = hits.missed.or_not(hits.flipped);
+                hits.missed = hits.missed | hits.flipped;
+                if back || !self.culls {
+                    page.put(cell, !back, &others);
+                }
+            }
+            if !(self.culls && back) {
+                page.put(cell, back, &hits);
+            }
         }
         let fragments = self.weigh(page.records());
         page.close(fragments);

@@ -70,6 +70,12 @@ pub struct Entry {
     pub splat: LocalSplat,
 }
 
+/// The number of a cell of a group of samples of one pixel.
+#[inline(always)]
+pub fn cell_of(place: u16, group: usize) -> usize {
+    group * PLACES + usize::from(place)
+}
+
 /// The records of a region, in splat order, and their grouping by cell.
 #[derive(Debug, Default)]
 pub struct RecordBuffer {
@@ -80,6 +86,7 @@ pub struct RecordBuffer {
     /// The splats of the region: their ranks, and what their fragments share.
     ranks: Vec<u32>,
     surfaces: Vec<SplatSurface>,
+    /// Number of cells, over [`PLACES`].
     groups: usize,
     /// One list a cell, or one for fronts and one for backs.
     sides: usize,
@@ -99,7 +106,7 @@ impl RecordBuffer {
     /// Bytes that a record needs with all that belongs to it.
     pub const BYTES_PER_RECORD: usize = size_of::<Record>() + size_of::<Key>() + size_of::<Entry>();
 
-    /// Empties the buffer, for a region of pixels of `groups` cells. It will take splats until it holds more than `limit`
+    /// Empties the buffer, for a tile of `groups` times [`PLACES`] cells. It will take splats until it holds more than `limit`
     /// records, and keep fronts and backs apart if `two_sided`.
     pub fn clear(&mut self, groups: usize, two_sided: bool, limit: usize) {
         self.groups = groups;
@@ -174,23 +181,20 @@ impl RecordBuffer {
         }
     }
 
-    /// The entries of a group of a place, each side in splat order, after [`RecordBuffer::group`]: fronts and backs, or all
-    /// and none.
+    /// The entries of a cell, each side in splat order, after [`RecordBuffer::group`]: fronts and backs, or all and none.
     #[inline(always)]
-    pub fn cell(&self, place: u16, group: usize) -> [&[Entry]; 2] {
-        let fronts = self.list(group, place);
-        [fronts, if self.sides == 1 { &[] } else { self.list(self.groups + group, place) }]
+    pub fn cell(&self, cell: usize) -> [&[Entry]; 2] {
+        [self.list(cell), if self.sides == 1 { &[] } else { self.list(self.groups * PLACES + cell) }]
     }
 
-    /// Whether a place has no records.
+    /// Whether a cell has no entries.
     #[inline(always)]
-    pub fn is_empty(&self, place: u16) -> bool {
-        (0..self.groups * self.sides).all(|list| self.list(list, place).is_empty())
+    pub fn is_empty(&self, cell: usize) -> bool {
+        self.cell(cell).iter().all(|entries| entries.is_empty())
     }
 
     #[inline(always)]
-    fn list(&self, side_and_group: usize, place: u16) -> &[Entry] {
-        let list = side_and_group * PLACES + usize::from(place);
+    fn list(&self, list: usize) -> &[Entry] {
         let ends = self.lists.as_flattened();
         let start = if list == 0 { 0 } else { ends[list - 1] };
         &self.entries[start as usize..ends[list] as usize]
@@ -260,6 +264,19 @@ impl Page<'_> {
             count: 0,
             total: &mut self.count,
         }
+    }
+
+    /// Takes the hits of any cell, if there are any. For the time being their r2 stand in place of their weights.
+    #[inline(always)]
+    pub fn put<L: Lanes>(&mut self, cell: u32, back: bool, hits: &LaneHits<L>) {
+        let list = if self.sides == 2 && back { self.groups * PLACES + cell as usize } else { cell as usize };
+        let record = &mut self.records[self.count];
+        (hits.depth | hits.missed).store_cell::<0>(&mut record.depth);
+        hits.r2.store_cell::<0>(&mut record.weight);
+        self.keys[self.count] = Key::new(list as u32, LocalSplat::new(self.number, back));
+        let kept = u32::from(hits.missed.bits() as u8 != u8::MAX);
+        self.lists.as_flattened_mut()[list] += kept;
+        self.count += kept as usize;
     }
 
     /// The records of the page.

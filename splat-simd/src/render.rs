@@ -1,13 +1,14 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
 use crate::lanes::{LANES, Level};
+use crate::lattice::Lattice;
 use crate::places::{PlaceList, place_of};
-use crate::raster::{RasterFrame, RasterJob};
-use crate::records::RecordBuffer;
+use crate::raster::{LatticeJob, RasterFrame, RasterJob};
+use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::ResolveJob;
 use crate::samples::LaneSamples;
 use rayon::prelude::*;
-use splat_abuffer::{Coverage, Fragment, Resolve, Thickness};
+use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
 use splat_core::render::{Frame, Tiles, quarters};
@@ -43,6 +44,8 @@ pub struct Renderer {
 struct Worker {
     records: RecordBuffer,
     places: PlaceList,
+    cells: Vec<u32>,
+    colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
 }
 
@@ -59,6 +62,8 @@ struct Picture<'a> {
     options: &'a RenderOptions,
     frame: &'a Frame,
     samples: LaneSamples,
+    /// For large circles of confusion.
+    lattice: Option<Lattice>,
     level: Level,
 }
 
@@ -233,7 +238,9 @@ impl<'a> Picture<'a> {
         frame: &'a Frame,
         level: Level,
     ) -> Self {
-        Self { cloud, camera, options, frame, samples: LaneSamples::new(&frame.rasterizer), level }
+        let samples = LaneSamples::new(&frame.rasterizer);
+        let lattice = Lattice::new(&frame.rasterizer, &frame.view);
+        Self { cloud, camera, options, frame, samples, lattice, level }
     }
 
     fn pixels(&self) -> PixelResolver<'_> {
@@ -254,13 +261,38 @@ impl<'a> Picture<'a> {
     /// Makes the fragments of a tile and forgets them.
     fn count(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Statistics {
         let start = Instant::now();
-        let Worker { records, places, .. } = worker;
-        records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
-        records.forget();
-        let frame = self.raster_frame();
-        let tests = self.level.run(RasterJob { frame, ranks, region: *region, records, places });
-        let fragments = records.fragments;
+        worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
+        worker.records.forget();
+        let lattice = self.lattice_for(region, ranks);
+        let tests = self.rasterize(worker, region, ranks, lattice);
+        let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
+    }
+
+    /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
+    fn lattice_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&Lattice> {
+        let lattice = self.lattice.as_ref()?;
+        let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
+        let gain: f64 = splats.map(|splat| lattice.gain(splat, region)).sum();
+        (gain > 0.0).then_some(lattice)
+    }
+
+    /// Makes the fragments of a region. Returns the number of samples tested.
+    fn rasterize(
+        &self,
+        worker: &mut Worker,
+        region: &PixelRect,
+        ranks: &[u32],
+        lattice: Option<&Lattice>,
+    ) -> u64 {
+        let Worker { records, places, cells, .. } = worker;
+        let (frame, region) = (self.raster_frame(), *region);
+        match lattice {
+            None => self.level.run(RasterJob { frame, ranks, region, records, places }),
+            Some(lattice) => {
+                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+            }
+        }
     }
 
     /// Renders a part of a tile, in quarters if its records exceed the budget.
@@ -274,29 +306,38 @@ impl<'a> Picture<'a> {
         statistics: &mut Statistics,
     ) {
         let start = Instant::now();
-        let Worker { records, places, .. } = worker;
         let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
         let limit = if region.area() > 1 { limit } else { usize::MAX };
-        records.clear(self.samples.groups(), self.two_sided(), limit);
-        let frame = self.raster_frame();
-        let tests = self.level.run(RasterJob { frame, ranks, region: *region, records, places });
-        if !records.is_complete() {
+        worker.records.clear(self.samples.groups(), self.two_sided(), limit);
+        let lattice = self.lattice_for(region, ranks);
+        let tests = self.rasterize(worker, region, ranks, lattice);
+        if !worker.records.is_complete() {
             statistics.raster += start.elapsed();
             for quarter in quarters(region) {
                 self.region(worker, &quarter, ranks, pixels, film, statistics);
             }
             return;
         }
-        records.group();
+        worker.records.group();
         statistics.raster += start.elapsed();
         statistics.tests += tests;
-        statistics.fragments += records.fragments;
+        statistics.fragments += worker.records.fragments;
         let start = Instant::now();
         match (self.options.resolve, self.options.aovs) {
             (Resolve::Surface { coverage, thickness: Thickness::AroundHit }, aovs) if few(aovs) => {
-                self.resolve_lanes(worker, region, coverage, pixels, film);
+                self.level.run_single(ResolveJob {
+                    region: *region,
+                    buffer: &worker.records,
+                    samples: &self.samples,
+                    coverage,
+                    opaque: self.cloud.opacities.is_none(),
+                    lattice,
+                    scratch: &mut worker.colors,
+                    pixels,
+                    film,
+                });
             }
-            _ => self.resolve_each(worker, region, pixels, film),
+            _ => self.resolve_each(worker, region, lattice, pixels, film),
         }
         statistics.resolve += start.elapsed();
     }
@@ -316,32 +357,13 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Resolves eight samples at once.
-    fn resolve_lanes(
-        &self,
-        worker: &Worker,
-        region: &PixelRect,
-        coverage: Coverage,
-        pixels: &mut PixelResolver<'_>,
-        film: &mut Film,
-    ) {
-        self.level.run_single(ResolveJob {
-            region: *region,
-            buffer: &worker.records,
-            samples: &self.samples,
-            coverage,
-            opaque: self.cloud.opacities.is_none(),
-            pixels,
-            film,
-        });
-    }
-
     /// Resolves sample by sample, as the reference does: for `over`, the listing's intervals, and the AOVs that ask for
     /// the fragments of a layer.
     fn resolve_each(
         &self,
         worker: &mut Worker,
         region: &PixelRect,
+        lattice: Option<&Lattice>,
         pixels: &mut PixelResolver<'_>,
         film: &mut Film,
     ) {
@@ -352,13 +374,14 @@ impl<'a> Picture<'a> {
                 pixels.start();
                 for sample in range.clone() {
                     let number = sample - range.start;
-                    let cell = records.cell(place_of(x, y), number / LANES);
+                    let place = place_of(x, y);
+                    let (cell, lane) = match lattice {
+                        None => (cell_of(place, number / LANES), number % LANES),
+                        Some(lattice) => lattice.cell_of(place, number),
+                    };
+                    let entries = records.cell(cell).into_iter().flatten();
                     fragments.clear();
-                    fragments.extend(
-                        cell.into_iter()
-                            .flatten()
-                            .filter_map(|&entry| records.fragment(entry, number % LANES)),
-                    );
+                    fragments.extend(entries.filter_map(|&entry| records.fragment(entry, lane)));
                     let place = SamplePlace { x, y, sample };
                     pixels.add(place, fragments, self.frame.rasterizer.samples());
                 }

@@ -4,9 +4,10 @@
 //! fragment's interval holds its depth, the layers come out front to back; as entries stand in splat order, each sum runs
 //! in splat order. So the bits are those of [`splat_abuffer::Resolver`].
 
-use crate::lanes::{Kernel, LANES, Lanes};
-use crate::places::place_of;
-use crate::records::{Entry, RecordBuffer};
+use crate::lanes::{Eight, Kernel, LANES, Lanes};
+use crate::lattice::Lattice;
+use crate::places::{PLACES, place_of};
+use crate::records::{Entry, RecordBuffer, cell_of};
 use crate::samples::LaneSamples;
 use splat_abuffer::{Coverage, MIN_LAYER_WEIGHT, SampleColor, SplatSurface};
 use splat_core::pixel::PixelResolver;
@@ -24,6 +25,10 @@ pub struct ResolveJob<'a, 'b> {
     pub coverage: Coverage,
     /// Whether every splat is opaque.
     pub opaque: bool,
+    /// What the cells are, if not groups of the samples of a pixel.
+    pub lattice: Option<&'a Lattice>,
+    /// Scratch.
+    pub scratch: &'a mut Vec<SampleColor>,
     /// Makes pixels of samples.
     pub pixels: &'a mut PixelResolver<'b>,
     /// Where the pixels go.
@@ -34,34 +39,80 @@ impl Kernel for ResolveJob<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        if self.opaque { self.resolve::<L, true>() } else { self.resolve::<L, false>() }
+    fn run<L: Lanes>(mut self) {
+        match (self.lattice, self.opaque) {
+            (None, true) => self.resolve_pixels::<L, true>(),
+            (None, false) => self.resolve_pixels::<L, false>(),
+            (Some(lattice), true) => self.resolve_lattice::<L, true>(lattice),
+            (Some(lattice), false) => self.resolve_lattice::<L, false>(lattice),
+        }
     }
 }
 
 impl ResolveJob<'_, '_> {
+    /// Resolves cells of samples of one pixel.
     #[inline(always)]
-    fn resolve<L: Lanes, const OPAQUE: bool>(self) {
+    fn resolve_pixels<L: Lanes, const OPAQUE: bool>(&mut self) {
         let groups = self.samples.groups();
         for y in self.region.y0..self.region.y1 {
             for x in self.region.x0..self.region.x1 {
                 let place = place_of(x, y);
-                if self.buffer.is_empty(place) {
+                if (0..groups).all(|group| self.buffer.is_empty(cell_of(place, group))) {
                     continue;
                 }
                 self.pixels.start();
                 for group in 0..groups {
-                    let resolver = CellResolver::<L, OPAQUE> {
-                        remaining: self.buffer.cell(place, group),
-                        buffer: self.buffer,
-                        coverage: self.coverage,
-                        colors: Colors::nothing(),
-                    };
-                    resolver.resolve().add_to(self.pixels, self.samples.samples_of(group));
+                    let colors = self.resolve_cell::<L, OPAQUE>(cell_of(place, group)).to_arrays();
+                    let samples = 0..self.samples.samples_of(group).min(LANES);
+                    self.pixels.add_colors(samples.map(|lane| sample_of(&colors, lane)));
                 }
                 self.pixels.finish(x, y, self.film);
             }
         }
+    }
+
+    /// Resolves the cells of a lattice, and puts their samples in order.
+    #[inline(always)]
+    fn resolve_lattice<L: Lanes, const OPAQUE: bool>(&mut self, lattice: &Lattice) {
+        let count = self.samples.samples();
+        self.scratch.clear();
+        self.scratch.resize(PLACES * count, SampleColor::NOTHING);
+        for cell in (0..lattice.cells()).filter(|&cell| !self.buffer.is_empty(cell)) {
+            let colors = self.resolve_cell::<L, OPAQUE>(cell).to_arrays();
+            for (lane, &(place, sample)) in lattice.samples(cell).iter().enumerate() {
+                self.scratch[usize::from(place) * count + sample as usize] = sample_of(&colors, lane);
+            }
+        }
+        for y in self.region.y0..self.region.y1 {
+            for x in self.region.x0..self.region.x1 {
+                let samples = &self.scratch[usize::from(place_of(x, y)) * count..][..count];
+                self.pixels.start();
+                self.pixels.add_colors(samples.iter().copied());
+                self.pixels.finish(x, y, self.film);
+            }
+        }
+    }
+
+    /// The colours of the samples of a cell.
+    #[inline(always)]
+    fn resolve_cell<L: Lanes, const OPAQUE: bool>(&self, cell: usize) -> Colors<L> {
+        let resolver = CellResolver::<L, OPAQUE> {
+            remaining: self.buffer.cell(cell),
+            buffer: self.buffer,
+            coverage: self.coverage,
+            colors: Colors::nothing(),
+        };
+        resolver.resolve()
+    }
+}
+
+/// The colour of a lane.
+#[inline(always)]
+fn sample_of([red, green, blue, transmittance, uncovered]: &[Eight; 5], lane: usize) -> SampleColor {
+    SampleColor {
+        color: [red[lane], green[lane], blue[lane]],
+        transmittance: transmittance[lane],
+        uncovered: uncovered[lane],
     }
 }
 
@@ -78,20 +129,15 @@ impl<L: Lanes> Colors<L> {
         Self { color: [L::splat(0.0); 3], transmittance: L::splat(1.0), uncovered: L::splat(1.0) }
     }
 
-    /// Adds the first samples to a pixel, in their order.
+    /// Red, green, blue, transmittance and what is uncovered of each lane.
     #[inline(always)]
-    fn add_to(&self, pixels: &mut PixelResolver<'_>, count: usize) {
+    fn to_arrays(&self) -> [Eight; 5] {
         let mut values = [[0.0; LANES]; 5];
         let [red, green, blue] = self.color;
         for (values, lanes) in values.iter_mut().zip([red, green, blue, self.transmittance, self.uncovered]) {
             lanes.store_cell::<0>(values);
         }
-        let [red, green, blue, transmittance, uncovered] = &values;
-        pixels.add_colors((0..count.min(LANES)).map(|lane| SampleColor {
-            color: [red[lane], green[lane], blue[lane]],
-            transmittance: transmittance[lane],
-            uncovered: uncovered[lane],
-        }));
+        values
     }
 
     /// Lays a layer behind what is there, where its weight is enough.

@@ -27,7 +27,7 @@ pub const PATTERNS: usize = 64;
 pub const SELECTION_SIZE: usize = 32;
 
 /// Side of the blocks of the selection table in which each pattern stands exactly once.
-const BLOCK: usize = 8;
+pub const BLOCK: usize = 8;
 
 /// How the points of a pattern are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

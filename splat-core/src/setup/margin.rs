@@ -12,7 +12,7 @@ use crate::evaluate::SplatConstants;
 pub const USUAL: f64 = 1.0 / 2048.0;
 
 /// The largest error of (u, v), in sigma, with which a splat is drawn.
-const MAX_ERROR: f64 = 0.25;
+pub const MAX_ERROR: f64 = 0.25;
 
 /// The part of [`MAX_ERROR`] that the numerators of (u, v) may take; the rest is left to their denominator g.
 const NUMERATOR_ERROR: f64 = 0.5 * MAX_ERROR;

@@ -19,6 +19,7 @@ mod view;
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
 pub use order::{SortKey, sort_keys, splat_order};
+pub use margin::MAX_ERROR;
 pub use outline::Outline;
 pub use projection::project;
 pub(crate) use view::Reach;

@@ -1,0 +1,350 @@
+//! Large circles of confusion: cells of samples that share their place on the lens, not on the picture.
+//!
+//! Through one point of the lens a splat is a small sharp disc, however large its circle of confusion. As the table of
+//! lens patterns holds each pattern once in every block of 8 x 8 pixels, the samples of one lens point are a lattice
+//! of spacing 8, and of eight neighbouring lens points (a *group*) each block has one sample each: a cell. So a splat
+//! looks, for every group, only at the blocks in which its disc lies, about one: the work does not grow with the blur.
+
+use crate::evaluate::LaneHits;
+use crate::lanes::{Eight, LANES, Lanes};
+use crate::places::{PLACES, TILE, place_of};
+use splat_core::PixelRect;
+use splat_core::raster::Rasterizer;
+use splat_core::sampling::{BLOCK, PATTERNS};
+use splat_core::setup::{BOX_PADDING, View, VisibleSplat};
+
+/// Blocks a side of a tile.
+const BLOCKS: usize = TILE as usize / BLOCK;
+
+/// A sample of a block: its lens pattern and its number.
+#[derive(Debug, Clone, Copy, Default)]
+struct LensSample {
+    pattern: usize,
+    sample: usize,
+    lens: [f32; 2],
+}
+
+/// The samples of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// Column and row in the tile.
+    pixel: [Eight; 2],
+    /// Position relative to the pixel's corner.
+    jitter: [Eight; 2],
+}
+
+/// The samples of a frame, by groups of lens points.
+#[derive(Debug)]
+pub struct Lattice {
+    /// Lens points of each group.
+    lens: Vec<[Eight; 2]>,
+    /// For eight groups at a time their boxes on the lens: least and greatest x, least and greatest y.
+    boxes: Vec<[Eight; 4]>,
+    /// Block by block, of each group.
+    cells: Vec<Cell>,
+    /// The same: place and number (from the first that is taken) of each sample.
+    samples: Vec<[(u16, u32); LANES]>,
+    /// For each place, the cell and the lane of each of its samples.
+    cell_of: Vec<(u32, u8)>,
+    /// Number of samples a pixel.
+    count: usize,
+    near: f64,
+    /// 1 / focus.
+    inverse_focus: f64,
+    /// sqrt(F), and as much as rounding can make of it.
+    radius: f64,
+    filter_radius: f64,
+    /// Mean side of the groups' boxes on the lens, and radius of the lens, in pixels at depth 1.
+    group_size: f64,
+    lens_radius: f64,
+}
+
+impl Lattice {
+    /// The lattice of a frame; `None` without a lens.
+    pub fn new(rasterizer: &Rasterizer, view: &View) -> Option<Self> {
+        let lens = view.lens?;
+        let range = rasterizer.range();
+        let table = rasterizer.samples();
+        let mut points: Vec<LensSample> = (0..PATTERNS)
+            .flat_map(|pattern| {
+                let points = table.lens_of_pattern(pattern);
+                range.clone().map(move |sample| LensSample { pattern, sample, lens: points[sample].p })
+            })
+            .collect();
+        gather_neighbors(&mut points);
+        let groups: Vec<&[LensSample; LANES]> = points.as_chunks().0.iter().collect();
+        let boxes = groups.as_chunks().0.iter().map(boxes_of).collect::<Vec<_>>();
+        let mut lattice = Self {
+            lens: groups.iter().map(|group| [0, 1].map(|axis| group.map(|point| point.lens[axis]))).collect(),
+            group_size: mean_size(&boxes),
+            boxes,
+            cells: Vec::new(),
+            samples: Vec::new(),
+            cell_of: vec![(0, 0); PLACES * range.len()],
+            count: range.len(),
+            near: view.near,
+            inverse_focus: 1.0 / lens.focus,
+            radius: view.cutoff.sqrt() + splat_core::setup::MAX_ERROR,
+            filter_radius: view.filter_radius,
+            lens_radius: lens.radius * view.pixel_scale.max_element(),
+        };
+        for block in 0..BLOCKS * BLOCKS {
+            lattice.add_block(block, &groups, rasterizer);
+        }
+        Some(lattice)
+    }
+
+    /// Adds the cells of a block.
+    fn add_block(&mut self, block: usize, groups: &[&[LensSample; LANES]], rasterizer: &Rasterizer) {
+        let table = rasterizer.samples();
+        let first = rasterizer.range().start;
+        let corner = [block % BLOCKS * BLOCK, block / BLOCKS * BLOCK];
+        // Where in the block each lens pattern stands.
+        let mut pixel_of = [[0; 2]; PATTERNS];
+        for i in 0..PATTERNS {
+            let [x, y] = [corner[0] + i % BLOCK, corner[1] + i / BLOCK].map(|coordinate| coordinate as i32);
+            pixel_of[table.patterns_of(x, y)[1]] = [x, y];
+        }
+        for group in groups {
+            let pixels = group.map(|point| pixel_of[point.pattern]);
+            let jitter = |lane: usize, axis: usize| {
+                let [x, y] = pixels[lane];
+                table.jitter(x, y)[group[lane].sample][axis]
+            };
+            let number = self.cells.len() as u32;
+            self.cells.push(Cell {
+                pixel: [0, 1].map(|axis| pixels.map(|pixel| pixel[axis] as f32)),
+                jitter: [0, 1].map(|axis| std::array::from_fn(|lane| jitter(lane, axis))),
+            });
+            let samples = std::array::from_fn(|lane| {
+                let [x, y] = pixels[lane];
+                (place_of(x, y), (group[lane].sample - first) as u32)
+            });
+            for (lane, &(place, sample)) in samples.iter().enumerate() {
+                self.cell_of[usize::from(place) * self.count + sample as usize] = (number, lane as u8);
+            }
+            self.samples.push(samples);
+        }
+    }
+
+    /// Number of cells of a tile.
+    pub fn cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The place and the number of each sample of a cell.
+    #[inline(always)]
+    pub fn samples(&self, cell: usize) -> &[(u16, u32); LANES] {
+        &self.samples[cell]
+    }
+
+    /// The cell and the lane of a sample of a place.
+    pub fn cell_of(&self, place: u16, sample: usize) -> (usize, usize) {
+        let (cell, lane) = self.cell_of[usize::from(place) * self.count + sample];
+        (cell as usize, usize::from(lane))
+    }
+
+    /// Whether a splat has less to test here than pixel by pixel, by an estimate; and by how many cells.
+    pub fn gain(&self, splat: &VisibleSplat, region: &PixelRect) -> f64 {
+        let Some(image) = self.image(splat) else { return 0.0 };
+        let blur = self.lens_radius * image.defocus.map(f64::abs).into_iter().fold(0.0, f64::max);
+        let [width, height] = [0, 1].map(|axis| image.max[axis] - image.min[axis] + 2.0 * self.filter_radius);
+        let share = splat.bounds.intersect(region).area() as f64 / splat.bounds.area() as f64;
+        let by_pixels = 0.8 * (width + 2.0 * blur) * (height + 2.0 * blur) * (self.count as f64 / LANES as f64);
+        let group = self.group_size / self.lens_radius * blur;
+        let blocks = |side: f64| 1.0 + (side + group) / BLOCK as f64;
+        let groups = self.lens.len() as f64;
+        // Each group's box takes about as long as a cell's eighth in every tile that the splat may touch.
+        share * (by_pixels - groups * blocks(width) * blocks(height)) - groups / LANES as f64
+    }
+
+    /// What a pinhole sees of a splat, and how far its depths are out of focus. `None` if that is not known.
+    fn image(&self, splat: &VisibleSplat) -> Option<Image> {
+        if !splat.outline.is_known() {
+            return None;
+        }
+        // The ellipse of `splat_core::setup::Outline`, without the circle of confusion.
+        let c = &splat.constants;
+        let [a1, b0, b1, depth] = [c.a1, c.b[0], c.b[1], c.depth].map(f64::from);
+        let (q, m) = (1.0 / a1, 1.0 / b0);
+        let p = -b1 * q * m;
+        let [s0, s1] = c.depth_slope.map(|slope| f64::from(slope) / depth);
+        let square = self.radius * self.radius;
+        let steepness = s0 * s0 + s1 * s1;
+        let clearance = 1.0 - square * steepness;
+        if clearance < 1.0 / 32.0 {
+            return None;
+        }
+        let scale = square / clearance;
+        let center = [-scale * (p * s0 + m * s1), -scale * q * s0];
+        // The constants are rounded; that is little against the padding.
+        let half = [scale * (p * p + m * m) + center[0] * center[0], scale * q * q + center[1] * center[1]]
+            .map(|square| square.sqrt() * (1.0 + 1e-5) + BOX_PADDING);
+        let middle = [f64::from(c.xf) + center[0], f64::from(c.yf) + center[1]];
+        let half_depth = depth * self.radius * steepness.sqrt() * (1.0 + 1e-5);
+        let nearest = (depth - half_depth).max(self.near) * (1.0 - 1e-4);
+        let defocus = [nearest, (depth + half_depth) * (1.0 + 1e-5)].map(|w| self.inverse_focus - 1.0 / w);
+        Some(Image {
+            min: [middle[0] - half[0], middle[1] - half[1]],
+            max: [middle[0] + half[0], middle[1] + half[1]],
+            defocus,
+        })
+    }
+
+    /// Lists the cells of a tile (given by its first pixel) in which a splat may be hit.
+    #[inline(always)]
+    pub fn list<L: Lanes>(&self, splat: &VisibleSplat, corner: [i32; 2], list: &mut Vec<u32>) {
+        list.clear();
+        let Some(image) = self.image(splat) else {
+            list.extend(0..self.cells.len() as u32);
+            return;
+        };
+        let center = [splat.constants.xi, splat.constants.yi];
+        let axis = |axis: usize| {
+            // Blocks of the tile from which samples reach the box: relative to the tile, in blocks.
+            let room = self.filter_radius + BOX_PADDING + 0.5;
+            let origin = f64::from(center[axis]) - f64::from(corner[axis]);
+            let scale = 1.0 / BLOCK as f64;
+            ([image.min[axis] - room + origin, image.max[axis] + room + origin])
+                .map(|edge| L::splat((edge * scale) as f32))
+        };
+        let ([left, right], [top, bottom]) = (axis(0), axis(1));
+        let defocus = image.defocus.map(|defocus| L::splat((defocus / BLOCK as f64) as f32));
+        for (eight, boxes) in self.boxes.iter().enumerate() {
+            let mut ranges = [[0.0; LANES]; 4];
+            let x = shifts::<L>(&boxes[0], &boxes[1], defocus);
+            let y = shifts::<L>(&boxes[2], &boxes[3], defocus);
+            let (x0, x1) = block_range(left + x[0], right + x[1]);
+            let (y0, y1) = block_range(top + y[0], bottom + y[1]);
+            let found = x0.less_or_equal(x1) & y0.less_or_equal(y1);
+            for (range, lanes) in ranges.iter_mut().zip([x0, x1, y0, y1]) {
+                lanes.store_cell::<0>(range);
+            }
+            let mut lanes = found.bits() & u32::from(u8::MAX);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let group = (eight * LANES + lane) as u32;
+                let [x0, x1, y0, y1] = [0, 1, 2, 3].map(|edge| ranges[edge][lane] as u32);
+                for row in y0..=y1 {
+                    for column in x0..=x1 {
+                        list.push((row * BLOCKS as u32 + column) * self.lens.len() as u32 + group);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Offset of a cell's samples from a splat, as the reference has it, and their lens points.
+    #[inline(always)]
+    pub fn offset<L: Lanes>(
+        &self,
+        cell: u32,
+        splat: &VisibleSplat,
+        corner: [i32; 2],
+        minus_fraction: &[L; 2],
+    ) -> ([L; 2], [L; 2]) {
+        let Cell { pixel, jitter } = &self.cells[cell as usize];
+        let lens = &self.lens[cell as usize % self.lens.len()];
+        let c = &splat.constants;
+        let apart = [corner[0] - c.xi, corner[1] - c.yi];
+        let whole = if apart.iter().all(|apart| apart.unsigned_abs() < 1 << 23) {
+            // The sum is exact, as its terms are.
+            [L::splat(apart[0] as f32) + L::load(&pixel[0]), L::splat(apart[1] as f32) + L::load(&pixel[1])]
+        } else {
+            far_offset(apart, pixel)
+        };
+        (
+            [
+                whole[0] + (L::load(&jitter[0]) + minus_fraction[0]),
+                whole[1] + (L::load(&jitter[1]) + minus_fraction[1]),
+            ],
+            [L::load(&lens[0]), L::load(&lens[1])],
+        )
+    }
+
+    /// Drops the hits of a cell whose pixels are not in a region of the tile.
+    #[inline(always)]
+    pub fn clip<L: Lanes>(&self, cell: u32, corner: [i32; 2], region: &PixelRect, hits: &mut LaneHits<L>) {
+        let Cell { pixel, .. } = &self.cells[cell as usize];
+        let (x, y) = (L::load(&pixel[0]), L::load(&pixel[1]));
+        let edge = |edge: i32, corner: i32| L::splat((edge - corner) as f32);
+        hits.missed = hits.missed
+            | x.less(edge(region.x0, corner[0]))
+            | x.not_less(edge(region.x1, corner[0]))
+            | y.less(edge(region.y0, corner[1]))
+            | y.not_less(edge(region.y1, corner[1]));
+    }
+}
+
+/// What a pinhole sees of a splat, in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
+struct Image {
+    min: [f64; 2],
+    max: [f64; 2],
+    defocus: [f64; 2],
+}
+
+/// How far the lens points of eight boxes can shift a splat: least and greatest.
+#[inline(always)]
+fn shifts<L: Lanes>(min: &Eight, max: &Eight, [near, far]: [L; 2]) -> [L; 2] {
+    let (min, max) = (L::load(min), L::load(max));
+    let products = (min * near, min * far, max * near, max * far);
+    [
+        products.0.least(products.1).least(products.2.least(products.3)),
+        products.0.greatest(products.1).greatest(products.2.greatest(products.3)),
+    ]
+}
+
+/// The blocks of a tile that overlap [low, high], in blocks; none if the first is greater than the last.
+#[inline(always)]
+fn block_range<L: Lanes>(low: L, high: L) -> (L, L) {
+    // Clamped before they are rounded, which is only for moderate numbers.
+    let (none_before, none_beyond) = (L::splat(-1.0), L::splat(BLOCKS as f32));
+    let first = low.greatest(none_before).least(none_beyond).round_down().greatest(L::splat(0.0));
+    let last = high.greatest(none_before).least(none_beyond).round_down().least(L::splat(BLOCKS as f32 - 1.0));
+    (first, last)
+}
+
+/// Offsets too large for exact sums: each rounded once, as the reference does.
+#[inline(never)]
+fn far_offset<L: Lanes>(apart: [i32; 2], pixel: &[Eight; 2]) -> [L; 2] {
+    let axis = |axis: usize| L::load(&pixel[axis].map(|pixel| (apart[axis] + pixel as i32) as f32));
+    [axis(0), axis(1)]
+}
+
+/// Orders lens points so that each eight in a row are neighbours: halves them along the longer side of their box, again and
+/// again.
+fn gather_neighbors(points: &mut [LensSample]) {
+    if points.len() <= LANES {
+        return;
+    }
+    let side = |axis: usize| {
+        let values = points.iter().map(|point| point.lens[axis]);
+        values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min)
+    };
+    let axis = usize::from(side(1) > side(0));
+    // Equal ones in the order of their numbers: nothing depends on the sort.
+    points.sort_unstable_by(|a, b| {
+        let order = a.lens[axis].total_cmp(&b.lens[axis]);
+        order.then((a.pattern, a.sample).cmp(&(b.pattern, b.sample)))
+    });
+    let half = (points.len() / 2).next_multiple_of(LANES);
+    let (low, high) = points.split_at_mut(half);
+    gather_neighbors(low);
+    gather_neighbors(high);
+}
+
+/// The boxes of eight groups: least and greatest x, least and greatest y.
+fn boxes_of(groups: &[&[LensSample; LANES]; LANES]) -> [Eight; 4] {
+    let edge = |axis: usize, pick: fn(f32, f32) -> f32| {
+        groups.map(|group| group.iter().map(|point| point.lens[axis]).reduce(pick).unwrap_or(0.0))
+    };
+    [edge(0, f32::min), edge(0, f32::max), edge(1, f32::min), edge(1, f32::max)]
+}
+
+fn mean_size(boxes: &[[Eight; 4]]) -> f64 {
+    let sides = boxes.iter().flat_map(|[x0, x1, y0, y1]| {
+        (0..LANES).map(move |lane| f64::from((x1[lane] - x0[lane]).max(y1[lane] - y0[lane])))
+    });
+    sides.clone().sum::<f64>() / sides.count() as f64
+}
