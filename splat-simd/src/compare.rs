@@ -1,8 +1,9 @@
 //! Both cores side by side: their fragments, splat by splat.
 
 use crate::lanes::{LANES, Level};
+use crate::lattice::{CellNumber, Lattice};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
-use crate::raster::{RasterFrame, RasterJob};
+use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::render::set_up;
 use crate::samples::LaneSamples;
@@ -19,9 +20,11 @@ const BORDER: i32 = 2;
 struct SplatBySplat<'a> {
     frame: &'a Frame,
     samples: LaneSamples,
+    lattice: Option<Lattice>,
     level: Level,
     records: RecordBuffer,
     places: PlaceList,
+    cells: Vec<CellNumber>,
 }
 
 impl<'a> SplatBySplat<'a> {
@@ -29,34 +32,32 @@ impl<'a> SplatBySplat<'a> {
         Self {
             frame,
             samples: LaneSamples::new(&frame.rasterizer),
+            lattice: Lattice::new(&frame.rasterizer, &frame.view),
             level,
             records: RecordBuffer::default(),
             places: PlaceList::default(),
+            cells: Vec::new(),
         }
     }
 
     /// Gives the fragments of a splat to `sink`: tile by tile, then by pixel and sample. Returns the number of samples
     /// tested.
-    fn fragments(&mut self, rank: usize, sink: &mut dyn FnMut(SamplePlace, Fragment)) -> u64 {
+    fn fragments(&mut self, rank: usize, method: Method, sink: &mut dyn FnMut(SamplePlace, Fragment)) -> u64 {
         let bounds = self.frame.set_up.splats[rank].bounds;
         let mut tests = 0;
         for row in bounds.y0.div_euclid(TILE)..=(bounds.y1 - 1).div_euclid(TILE) {
             for column in bounds.x0.div_euclid(TILE)..=(bounds.x1 - 1).div_euclid(TILE) {
-                tests += self.fragments_in_tile(rank, [column * TILE, row * TILE], sink);
+                let [x, y] = [column * TILE, row * TILE];
+                let tile = PixelRect::new(x, y, x + TILE, y + TILE);
+                tests += self.rasterize(rank, tile.intersect(&self.frame.view.window), method);
+                self.collect([x, y], method, sink);
             }
         }
         tests
     }
 
-    /// [`SplatBySplat::fragments`] in the tile of which `corner` is the first pixel.
-    fn fragments_in_tile(
-        &mut self,
-        rank: usize,
-        corner: [i32; 2],
-        sink: &mut dyn FnMut(SamplePlace, Fragment),
-    ) -> u64 {
-        let (groups, first) = (self.samples.groups(), self.frame.rasterizer.range().start);
-        let [x, y] = corner;
+    /// Makes the fragments of a splat in a region of a tile.
+    fn rasterize(&mut self, rank: usize, region: PixelRect, method: Method) -> u64 {
         let frame = RasterFrame {
             rasterizer: &self.frame.rasterizer,
             samples: &self.samples,
@@ -64,29 +65,54 @@ impl<'a> SplatBySplat<'a> {
             surfaces: &self.frame.set_up.surfaces,
             filter_radius: self.frame.view.filter_radius as f32,
         };
-        self.records.clear(groups, false, usize::MAX);
-        let tests = self.level.run(RasterJob {
-            frame,
-            ranks: &[rank as u32],
-            region: PixelRect::new(x, y, x + TILE, y + TILE),
-            records: &mut self.records,
-            places: &mut self.places,
-        });
+        let Self { records, places, cells, .. } = self;
+        records.clear(self.samples.groups(), false, usize::MAX);
+        let ranks = &[rank as u32];
+        let tests = match (method, &self.lattice) {
+            (Method::LensPoints, Some(lattice)) => {
+                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+            }
+            _ => self.level.run(RasterJob { frame, ranks, region, records, places }),
+        };
         self.records.group();
-        let cells = (0..PLACES as u16).flat_map(|place| (0..groups).map(move |group| (place, group)));
-        for (pixel, group) in cells {
-            let [entries, _] = self.records.cell(cell_of(pixel, group));
+        tests
+    }
+
+    /// Gives the fragments of the tile of which `corner` is the first pixel to `sink`.
+    fn collect(&self, corner: [i32; 2], method: Method, sink: &mut dyn FnMut(SamplePlace, Fragment)) {
+        if self.records.fragments == 0 {
+            return;
+        }
+        let first = self.frame.rasterizer.range().start;
+        for pixel in 0..PLACES as u16 {
             let [column, row] = pixel_of(pixel);
-            for lane in (0..LANES).filter(|_| !entries.is_empty()) {
-                let sample = first + group * LANES + lane;
-                let place = SamplePlace { x: x + column, y: y + row, sample };
+            for number in 0..self.samples.samples() {
+                let (cell, lane) = match (method, &self.lattice) {
+                    (Method::LensPoints, Some(lattice)) => lattice.cell_of(pixel, number),
+                    _ => (cell_of(pixel, number / LANES), number % LANES),
+                };
+                let place = SamplePlace { x: corner[0] + column, y: corner[1] + row, sample: first + number };
+                let [entries, _] = self.records.cell(cell);
                 for fragment in entries.iter().filter_map(|&entry| self.records.fragment(entry, lane)) {
                     sink(place, fragment);
                 }
             }
         }
-        tests
     }
+}
+
+/// How the fast core looks for fragments: both ways find the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Pixel by pixel, eight samples of each at once.
+    Pixels,
+    /// Eight neighbouring points of the lens at once, for large circles of confusion; without a lens pixel by pixel.
+    LensPoints,
+}
+
+impl Method {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Pixels, Self::LensPoints];
 }
 
 /// Gives every fragment of a picture to `sink`, as [`splat_core::fragments()`] does: splat by splat in splat order, but
@@ -99,6 +125,7 @@ pub fn fragments(
     camera: &Camera,
     options: &RenderOptions,
     level: Level,
+    method: Method,
     sink: &mut dyn FnMut(SamplePlace, u32, Fragment),
 ) -> Result<u64, Error> {
     let frame = Frame::new(cloud, camera, options, |cloud, view, options| {
@@ -107,7 +134,9 @@ pub fn fragments(
     let mut fast = SplatBySplat::new(&frame, level);
     let splats = frame.set_up.splats.iter().enumerate();
     Ok(splats
-        .map(|(rank, splat)| fast.fragments(rank, &mut |place, fragment| sink(place, splat.index, fragment)))
+        .map(|(rank, splat)| {
+            fast.fragments(rank, method, &mut |place, fragment| sink(place, splat.index, fragment))
+        })
         .sum())
 }
 
@@ -126,7 +155,7 @@ pub struct Difference {
 
 /// Runs both cores side by side over every splat, and gives the first fragment in which they differ, bit for bit, or
 /// else the number of fragments in which they agree. The reference tests every sample of the splat's box and of a border
-/// around it, wherever the fast core looks. `progress` is told the finished part, from 0 to 1.
+/// around it, wherever the fast core looks, and through a lens the fast core looks by both of its methods. `progress` is told the finished part, from 0 to 1.
 ///
 /// # Errors
 /// As [`splat_core::render()`].
@@ -141,6 +170,7 @@ pub fn compare(
         set_up(cloud, view, options, SetUp::default())
     })?;
     let mut core = SplatBySplat::new(&frame, level);
+    let methods: &[Method] = if core.lattice.is_some() { &Method::ALL } else { &[Method::Pixels] };
     let count = frame.set_up.splats.len();
     let (mut reference, mut fast) = (Vec::new(), Vec::new());
     let mut total = 0;
@@ -157,14 +187,16 @@ pub fn compare(
             &near.intersect(&frame.view.window),
             &mut |place, fragment| reference.push((place, fragment)),
         );
-        fast.clear();
-        core.fragments(rank, &mut |place, fragment| fast.push((place, fragment)));
         // One order for both: rows, columns, samples.
         let key = |place: &SamplePlace| (place.y, place.x, place.sample);
         reference.sort_by_key(|(place, _)| key(place));
-        fast.sort_by_key(|(place, _)| key(place));
-        if let Some(difference) = first_difference(&reference, &fast, splat.index) {
-            return Ok(Err(difference));
+        for &method in methods {
+            fast.clear();
+            core.fragments(rank, method, &mut |place, fragment| fast.push((place, fragment)));
+            fast.sort_by_key(|(place, _)| key(place));
+            if let Some(difference) = first_difference(&reference, &fast, splat.index) {
+                return Ok(Err(difference));
+            }
         }
         total += reference.len() as u64;
     }

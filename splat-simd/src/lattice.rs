@@ -11,7 +11,7 @@ use crate::places::{PLACES, TILE, place_of};
 use splat_core::PixelRect;
 use splat_core::raster::Rasterizer;
 use splat_core::sampling::{BLOCK, PATTERNS};
-use splat_core::setup::{BOX_PADDING, View, VisibleSplat};
+use splat_core::setup::{BOX_PADDING, MAX_ERROR, USUAL_MARGIN, View, VisibleSplat};
 
 /// Blocks a side of a tile.
 const BLOCKS: usize = TILE as usize / BLOCK;
@@ -33,12 +33,21 @@ struct Cell {
     jitter: [Eight; 2],
 }
 
+/// The number of a cell, and that of its group.
+#[derive(Debug, Clone, Copy)]
+pub struct CellNumber {
+    /// Blocks times groups, plus group.
+    pub cell: u32,
+    /// Group of lens points.
+    pub group: u32,
+}
+
 /// The samples of a frame, by groups of lens points.
 #[derive(Debug)]
 pub struct Lattice {
     /// Lens points of each group.
     lens: Vec<[Eight; 2]>,
-    /// For eight groups at a time their boxes on the lens: least and greatest x, least and greatest y.
+    /// For eight groups at a time their boxes on the lens: middle and half the length in x, and in y.
     boxes: Vec<[Eight; 4]>,
     /// Block by block, of each group.
     cells: Vec<Cell>,
@@ -51,7 +60,7 @@ pub struct Lattice {
     near: f64,
     /// 1 / focus.
     inverse_focus: f64,
-    /// sqrt(F), and as much as rounding can make of it.
+    /// sqrt(F).
     radius: f64,
     filter_radius: f64,
     /// Mean side of the groups' boxes on the lens, and radius of the lens, in pixels at depth 1.
@@ -84,7 +93,7 @@ impl Lattice {
             count: range.len(),
             near: view.near,
             inverse_focus: 1.0 / lens.focus,
-            radius: view.cutoff.sqrt() + splat_core::setup::MAX_ERROR,
+            radius: view.cutoff.sqrt(),
             filter_radius: view.filter_radius,
             lens_radius: lens.radius * view.pixel_scale.max_element(),
         };
@@ -150,7 +159,8 @@ impl Lattice {
         let blur = self.lens_radius * image.defocus.map(f64::abs).into_iter().fold(0.0, f64::max);
         let [width, height] = [0, 1].map(|axis| image.max[axis] - image.min[axis] + 2.0 * self.filter_radius);
         let share = splat.bounds.intersect(region).area() as f64 / splat.bounds.area() as f64;
-        let by_pixels = 0.8 * (width + 2.0 * blur) * (height + 2.0 * blur) * (self.count as f64 / LANES as f64);
+        let by_pixels =
+            0.8 * (width + 2.0 * blur) * (height + 2.0 * blur) * (self.count as f64 / LANES as f64);
         let group = self.group_size / self.lens_radius * blur;
         let blocks = |side: f64| 1.0 + (side + group) / BLOCK as f64;
         let groups = self.lens.len() as f64;
@@ -169,7 +179,8 @@ impl Lattice {
         let (q, m) = (1.0 / a1, 1.0 / b0);
         let p = -b1 * q * m;
         let [s0, s1] = c.depth_slope.map(|slope| f64::from(slope) / depth);
-        let square = self.radius * self.radius;
+        let radius = if splat.certain { self.radius * (1.0 + USUAL_MARGIN) } else { self.radius + MAX_ERROR };
+        let square = radius * radius;
         let steepness = s0 * s0 + s1 * s1;
         let clearance = 1.0 - square * steepness;
         if clearance < 1.0 / 32.0 {
@@ -181,7 +192,7 @@ impl Lattice {
         let half = [scale * (p * p + m * m) + center[0] * center[0], scale * q * q + center[1] * center[1]]
             .map(|square| square.sqrt() * (1.0 + 1e-5) + BOX_PADDING);
         let middle = [f64::from(c.xf) + center[0], f64::from(c.yf) + center[1]];
-        let half_depth = depth * self.radius * steepness.sqrt() * (1.0 + 1e-5);
+        let half_depth = depth * radius * steepness.sqrt() * (1.0 + 1e-5);
         let nearest = (depth - half_depth).max(self.near) * (1.0 - 1e-4);
         let defocus = [nearest, (depth + half_depth) * (1.0 + 1e-5)].map(|w| self.inverse_focus - 1.0 / w);
         Some(Image {
@@ -193,66 +204,69 @@ impl Lattice {
 
     /// Lists the cells of a tile (given by its first pixel) in which a splat may be hit.
     #[inline(always)]
-    pub fn list<L: Lanes>(&self, splat: &VisibleSplat, corner: [i32; 2], list: &mut Vec<u32>) {
+    pub fn list<L: Lanes>(&self, splat: &VisibleSplat, corner: [i32; 2], list: &mut Vec<CellNumber>) {
         list.clear();
+        let groups = self.lens.len() as u32;
         let Some(image) = self.image(splat) else {
-            list.extend(0..self.cells.len() as u32);
+            let blocks = 0..(BLOCKS * BLOCKS) as u32;
+            let cells = blocks.flat_map(|block| (0..groups).map(move |group| (block * groups, group)));
+            list.extend(cells.map(|(first, group)| CellNumber { cell: first + group, group }));
             return;
         };
-        let center = [splat.constants.xi, splat.constants.yi];
-        let axis = |axis: usize| {
-            // Blocks of the tile from which samples reach the box: relative to the tile, in blocks.
-            let room = self.filter_radius + BOX_PADDING + 0.5;
-            let origin = f64::from(center[axis]) - f64::from(corner[axis]);
-            let scale = 1.0 / BLOCK as f64;
-            ([image.min[axis] - room + origin, image.max[axis] + room + origin])
-                .map(|edge| L::splat((edge * scale) as f32))
-        };
-        let ([left, right], [top, bottom]) = (axis(0), axis(1));
-        let defocus = image.defocus.map(|defocus| L::splat((defocus / BLOCK as f64) as f32));
+        let [x, y] = [0, 1].map(|axis| self.reach(&image, axis, splat, corner));
         for (eight, boxes) in self.boxes.iter().enumerate() {
-            let mut ranges = [[0.0; LANES]; 4];
-            let x = shifts::<L>(&boxes[0], &boxes[1], defocus);
-            let y = shifts::<L>(&boxes[2], &boxes[3], defocus);
-            let (x0, x1) = block_range(left + x[0], right + x[1]);
-            let (y0, y1) = block_range(top + y[0], bottom + y[1]);
-            let found = x0.less_or_equal(x1) & y0.less_or_equal(y1);
-            for (range, lanes) in ranges.iter_mut().zip([x0, x1, y0, y1]) {
-                lanes.store_cell::<0>(range);
+            // Bit l + 8 b is set where the box of group l reaches block b of a row, or of a column.
+            let columns = x.blocks::<L>(&boxes[0], &boxes[1]);
+            let rows = y.blocks::<L>(&boxes[2], &boxes[3]);
+            if columns == 0 || rows == 0 {
+                continue;
             }
-            let mut lanes = found.bits() & u32::from(u8::MAX);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let group = (eight * LANES + lane) as u32;
-                let [x0, x1, y0, y1] = [0, 1, 2, 3].map(|edge| ranges[edge][lane] as u32);
-                for row in y0..=y1 {
-                    for column in x0..=x1 {
-                        list.push((row * BLOCKS as u32 + column) * self.lens.len() as u32 + group);
-                    }
+            let group = (eight * LANES) as u32;
+            for row in 0..BLOCKS as u32 {
+                let row_groups = rows >> (row * LANES as u32) & 0xff;
+                let mut found = columns & row_groups * 0x0101_0101;
+                while found != 0 {
+                    let bit = found.trailing_zeros();
+                    found &= found - 1;
+                    let group = group + bit % LANES as u32;
+                    let block = row * BLOCKS as u32 + bit / LANES as u32;
+                    list.push(CellNumber { cell: block * groups + group, group });
                 }
             }
         }
     }
 
-    /// Offset of a cell's samples from a splat, as the reference has it, and their lens points.
+    /// How far a splat reaches along an axis, for [`Reach::blocks`].
+    #[inline(always)]
+    fn reach(&self, image: &Image, axis: usize, splat: &VisibleSplat, corner: [i32; 2]) -> Reach {
+        let room = self.filter_radius + BOX_PADDING + 0.5;
+        let center = [splat.constants.xi, splat.constants.yi];
+        let origin = f64::from(center[axis]) - f64::from(corner[axis]);
+        let [near, far] = image.defocus;
+        let in_blocks = |pixels: f64| (pixels / BLOCK as f64) as f32;
+        Reach {
+            min: in_blocks(image.min[axis] - room + origin),
+            max: in_blocks(image.max[axis] + room + origin),
+            defocus: in_blocks(0.5 * (near + far)),
+            spread: in_blocks(0.5 * (near - far).abs()),
+        }
+    }
+
+    /// Offset of a cell's samples from a splat, as the reference has it, and their lens points. `apart` is that of the
+    /// tile's first pixel.
     #[inline(always)]
     pub fn offset<L: Lanes>(
         &self,
-        cell: u32,
-        splat: &VisibleSplat,
-        corner: [i32; 2],
+        number: CellNumber,
+        apart: &Apart<L>,
         minus_fraction: &[L; 2],
     ) -> ([L; 2], [L; 2]) {
-        let Cell { pixel, jitter } = &self.cells[cell as usize];
-        let lens = &self.lens[cell as usize % self.lens.len()];
-        let c = &splat.constants;
-        let apart = [corner[0] - c.xi, corner[1] - c.yi];
-        let whole = if apart.iter().all(|apart| apart.unsigned_abs() < 1 << 23) {
+        let Cell { pixel, jitter } = &self.cells[number.cell as usize];
+        let lens = &self.lens[number.group as usize];
+        let whole = match apart {
             // The sum is exact, as its terms are.
-            [L::splat(apart[0] as f32) + L::load(&pixel[0]), L::splat(apart[1] as f32) + L::load(&pixel[1])]
-        } else {
-            far_offset(apart, pixel)
+            Apart::Near([x, y]) => [*x + L::load(&pixel[0]), *y + L::load(&pixel[1])],
+            Apart::Far(apart) => far_offset(*apart, pixel),
         };
         (
             [
@@ -277,6 +291,28 @@ impl Lattice {
     }
 }
 
+/// How far the first pixel of a tile is from a splat's pixel.
+#[derive(Debug, Clone, Copy)]
+pub enum Apart<L> {
+    /// So near that offsets in the tile are exact sums.
+    Near([L; 2]),
+    /// So far that they have to be rounded as the reference does.
+    Far([i32; 2]),
+}
+
+impl<L: Lanes> Apart<L> {
+    /// From the splat's pixel to the tile's first.
+    #[inline(always)]
+    pub fn new(splat: &VisibleSplat, corner: [i32; 2]) -> Self {
+        let [x, y] = [corner[0] - splat.constants.xi, corner[1] - splat.constants.yi];
+        if x.unsigned_abs().max(y.unsigned_abs()) < 1 << 23 {
+            Self::Near([L::splat(x as f32), L::splat(y as f32)])
+        } else {
+            Self::Far([x, y])
+        }
+    }
+}
+
 /// What a pinhole sees of a splat, in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
 struct Image {
     min: [f64; 2],
@@ -284,25 +320,37 @@ struct Image {
     defocus: [f64; 2],
 }
 
-/// How far the lens points of eight boxes can shift a splat: least and greatest.
-#[inline(always)]
-fn shifts<L: Lanes>(min: &Eight, max: &Eight, [near, far]: [L; 2]) -> [L; 2] {
-    let (min, max) = (L::load(min), L::load(max));
-    let products = (min * near, min * far, max * near, max * far);
-    [
-        products.0.least(products.1).least(products.2.least(products.3)),
-        products.0.greatest(products.1).greatest(products.2.greatest(products.3)),
-    ]
+/// How far a splat reaches along an axis, in blocks from the tile's first.
+struct Reach {
+    /// The pinhole's image, widened by the pixel filter.
+    min: f32,
+    max: f32,
+    /// 1/focus - 1/w, times blocks a pixel: the middle of its range, and half of its length.
+    defocus: f32,
+    spread: f32,
 }
 
-/// The blocks of a tile that overlap [low, high], in blocks; none if the first is greater than the last.
-#[inline(always)]
-fn block_range<L: Lanes>(low: L, high: L) -> (L, L) {
-    // Clamped before they are rounded, which is only for moderate numbers.
-    let (none_before, none_beyond) = (L::splat(-1.0), L::splat(BLOCKS as f32));
-    let first = low.greatest(none_before).least(none_beyond).round_down().greatest(L::splat(0.0));
-    let last = high.greatest(none_before).least(none_beyond).round_down().least(L::splat(BLOCKS as f32 - 1.0));
-    (first, last)
+impl Reach {
+    /// The blocks 0 to 3 that a splat reaches through eight groups of lens points, given the middle and half the length of
+    /// their boxes: bit l + 8 b is set for block b and group l.
+    #[inline(always)]
+    fn blocks<L: Lanes>(&self, middle: &Eight, half: &Eight) -> u32 {
+        let (middle, half) = (L::load(middle), L::load(half));
+        let (defocus, spread) = (L::splat(self.defocus), L::splat(self.spread));
+        let shift = middle * defocus;
+        let zero = L::splat(0.0);
+        // (m +- h)(d +- s) lies within |m| s + h (|d| + s) of m d.
+        let around =
+            middle.greatest(zero - middle) * spread + half * L::splat(self.defocus.abs() + self.spread);
+        let low = L::splat(self.min) + shift - around;
+        let high = L::splat(self.max) + shift + around;
+        let mut blocks = 0;
+        for block in 0..BLOCKS {
+            let reached = low.less(L::splat(block as f32 + 1.0)) & L::splat(block as f32).less_or_equal(high);
+            blocks |= (reached.bits() & u32::from(u8::MAX)) << (block * LANES);
+        }
+        blocks
+    }
 }
 
 /// Offsets too large for exact sums: each rounded once, as the reference does.
@@ -334,17 +382,28 @@ fn gather_neighbors(points: &mut [LensSample]) {
     gather_neighbors(high);
 }
 
-/// The boxes of eight groups: least and greatest x, least and greatest y.
+/// The boxes of eight groups: middle and half the length in x, and in y.
 fn boxes_of(groups: &[&[LensSample; LANES]; LANES]) -> [Eight; 4] {
     let edge = |axis: usize, pick: fn(f32, f32) -> f32| {
         groups.map(|group| group.iter().map(|point| point.lens[axis]).reduce(pick).unwrap_or(0.0))
     };
-    [edge(0, f32::min), edge(0, f32::max), edge(1, f32::min), edge(1, f32::max)]
+    let middle_and_half = |axis: usize| {
+        let (min, max) = (edge(axis, f32::min), edge(axis, f32::max));
+        let middle: Eight = std::array::from_fn(|group| 0.5 * (min[group] + max[group]));
+        // However the middle was rounded, and a little more for the sums to come.
+        let half = std::array::from_fn(|group| {
+            (max[group] - middle[group]).max(middle[group] - min[group]) * (1.0 + 1e-5)
+        });
+        [middle, half]
+    };
+    let ([x, dx], [y, dy]) = (middle_and_half(0), middle_and_half(1));
+    [x, dx, y, dy]
 }
 
+/// The mean of the longer sides of the boxes.
 fn mean_size(boxes: &[[Eight; 4]]) -> f64 {
-    let sides = boxes.iter().flat_map(|[x0, x1, y0, y1]| {
-        (0..LANES).map(move |lane| f64::from((x1[lane] - x0[lane]).max(y1[lane] - y0[lane])))
-    });
+    let sides = boxes
+        .iter()
+        .flat_map(|[_, dx, _, dy]| (0..LANES).map(move |lane| 2.0 * f64::from(dx[lane].max(dy[lane]))));
     sides.clone().sum::<f64>() / sides.count() as f64
 }

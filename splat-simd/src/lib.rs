@@ -15,6 +15,6 @@ mod render;
 mod resolve;
 mod samples;
 
-pub use compare::{Difference, compare, fragments};
+pub use compare::{Difference, Method, compare, fragments};
 pub use lanes::Level;
 pub use render::{Renderer, render};

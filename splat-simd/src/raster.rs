@@ -2,7 +2,7 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Kernel, LANES, Lanes, prefetch};
-use crate::lattice::Lattice;
+use crate::lattice::{Apart, CellNumber, Lattice};
 use crate::places::{PLACES, PlaceList, TILE};
 use crate::records::{Page, Record, RecordBuffer};
 use crate::samples::{GroupSamples, LaneSamples, limits};
@@ -123,7 +123,7 @@ pub struct LatticeJob<'a> {
     /// Where the fragments go.
     pub records: &'a mut RecordBuffer,
     /// Scratch.
-    pub cells: &'a mut Vec<u32>,
+    pub cells: &'a mut Vec<CellNumber>,
 }
 
 impl Kernel for LatticeJob<'_> {
@@ -225,32 +225,59 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     fn rasterize_cells<const PLAIN: bool>(
         &self,
         lattice: &Lattice,
-        cells: &[u32],
+        cells: &[CellNumber],
         corner: [i32; 2],
         clip: Option<&PixelRect>,
         mut page: Page<'_>,
     ) {
-        let back = self.splat.back;
-        for &cell in cells {
-            let (d, p) = lattice.offset::<L>(cell, self.splat, corner, &self.minus_fraction);
-            let mut hits = self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits);
-            if let Some(region) = clip {
-                lattice.clip(cell, corner, region, &mut hits);
-            }
-            if self.splat.flips {
-                let mut others = hits;
-                others.missed = hits.missed.or_not(hits.flipped);
-                hits.missed = hits.missed | hits.flipped;
-                if back || !self.culls {
-                    page.put(cell, !back, &others);
+        let apart = Apart::new(self.splat, corner);
+        let ordinary = clip.is_none() && !self.splat.flips && matches!(apart, Apart::Near(_));
+        if ordinary {
+            if !(self.culls && self.splat.back) {
+                for &number in cells {
+                    let hits = self.cell_hits::<PLAIN>(lattice, number, &apart);
+                    page.put(number.cell, self.splat.back, &hits);
                 }
             }
-            if !(self.culls && back) {
-                page.put(cell, back, &hits);
+        } else {
+            for &number in cells {
+                let mut hits = self.cell_hits::<PLAIN>(lattice, number, &apart);
+                if let Some(region) = clip {
+                    lattice.clip(number.cell, corner, region, &mut hits);
+                }
+                self.put_sides(number.cell, hits, &mut page);
             }
         }
         let fragments = self.weigh(page.records());
         page.close(fragments);
+    }
+
+    /// The hits in a cell of a lattice.
+    #[inline(always)]
+    fn cell_hits<const PLAIN: bool>(
+        &self,
+        lattice: &Lattice,
+        number: CellNumber,
+        apart: &Apart<L>,
+    ) -> LaneHits<L> {
+        let (d, p) = lattice.offset(number, apart, &self.minus_fraction);
+        self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
+    }
+
+    /// Puts the hits of a cell, front and back apart, on a page.
+    #[inline(always)]
+    fn put_sides(&self, cell: u32, mut hits: LaneHits<L>, page: &mut Page<'_>) {
+        let back = self.splat.back;
+        if self.splat.flips {
+            let others = LaneHits { missed: hits.missed.or_not(hits.flipped), ..hits };
+            hits.missed = hits.missed | hits.flipped;
+            if back || !self.culls {
+                page.put(cell, !back, &others);
+            }
+        }
+        if !(self.culls && back) {
+            page.put(cell, back, &hits);
+        }
     }
 
     /// Turns the r2 of some records into weights, and drops what weighs nothing. Returns the number of fragments left.

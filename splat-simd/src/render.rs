@@ -1,7 +1,7 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
 use crate::lanes::{LANES, Level};
-use crate::lattice::Lattice;
+use crate::lattice::{CellNumber, Lattice};
 use crate::places::{PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
@@ -44,7 +44,7 @@ pub struct Renderer {
 struct Worker {
     records: RecordBuffer,
     places: PlaceList,
-    cells: Vec<u32>,
+    cells: Vec<CellNumber>,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
 }

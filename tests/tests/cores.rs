@@ -8,7 +8,7 @@ use splat_core::{
     AovSelection, Camera, Cloud, Kernel, Lens, PatternKind, PixelFilter, PixelRect, RenderOptions, Shapes,
     TableMode,
 };
-use splat_simd::{Level, Renderer};
+use splat_simd::{Level, Method, Renderer};
 use splat_tests::random::Random;
 use splat_tests::scenes::{Scene, golden, jumble, orthographic, pinhole, with_lens};
 
@@ -29,9 +29,10 @@ fn check_fragments(cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> u
     let reference = sorted(|sink| {
         splat_core::fragments(cloud, camera, options, sink).unwrap();
     });
-    for level in Level::available() {
+    let both = Level::available().into_iter().flat_map(|level| Method::ALL.map(|method| (level, method)));
+    for (level, method) in both {
         let fast = sorted(|sink| {
-            splat_simd::fragments(cloud, camera, options, level, sink).unwrap();
+            splat_simd::fragments(cloud, camera, options, level, method, sink).unwrap();
         });
         let first = reference.iter().zip(&fast).find(|(a, b)| a != b);
         assert!(first.is_none(), "{}: {first:?}", level.name());

@@ -18,8 +18,8 @@ mod view;
 
 pub use bounds::{Extent, half_depth, orthographic_extent, perspective_extent};
 pub use error_bound::{EPSILON, ErrorBound};
+pub use margin::{MAX_ERROR, USUAL as USUAL_MARGIN};
 pub use order::{SortKey, sort_keys, splat_order};
-pub use margin::MAX_ERROR;
 pub use outline::Outline;
 pub use projection::project;
 pub(crate) use view::Reach;
@@ -81,6 +81,9 @@ pub struct VisibleSplat {
     /// Whether in `bounds` the cutoff alone decides what is a hit: its centre is the reference point, near and far plane are
     /// well away, and for a pinhole all samples lie well before the horizon of its plane (g > 0).
     pub plain: bool,
+    /// Whether rounding moves no hit by more than a trifle: all lie within sqrt(F) sigma, give or take
+    /// [`USUAL_MARGIN`] of it; else within [`MAX_ERROR`] sigma of that.
+    pub certain: bool,
 }
 
 /// The result of set-up.
@@ -169,6 +172,7 @@ impl SetUp {
             back: splat.back,
             flips: cloud.oriented && sees_both_sides(&exact, view),
             plain: is_plain(&exact, &bounds, depth, view),
+            certain: radius == usual,
         });
         Outcome::Visible
     }
