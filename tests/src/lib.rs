@@ -1,6 +1,7 @@
 //! The test oracle: what every renderer of this workspace is judged against.
 //!
 //! - [`analytic`]: what the analytic tests measure pictures by;
+//! - [`hard_scenes`]: scenes that are meant to be hard for a renderer;
 //! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
 //! - [`core_scenes`]: scenes of `splat-core`, and the same for the brute-force truth;
@@ -13,6 +14,7 @@ pub mod analytic;
 pub mod brute_force;
 pub mod core_scenes;
 pub mod errata_scenes;
+pub mod hard_scenes;
 pub mod listing;
 pub mod random;
 pub mod scenes;
