@@ -250,9 +250,6 @@ mod tests {
                     let degree = KernelTable::new(kernel, cutoff, mode).polynomials.unwrap().degree;
                     let bound = Polynomials::error_bound(kernel, cutoff, degree);
                     let error = largest_error(kernel, cutoff, mode);
-                    println!(
-                        "{kernel:?} F={cutoff} {mode:?} degree {degree}: {error:.2e}, bound {bound:.2e}"
-                    );
                     assert!(error <= bound + rounding, "{kernel:?} F={cutoff} {mode:?}: {error}");
                     // No looser than need be: the next lower degree would not do.
                     if mode == TableMode::Poly8 {

@@ -224,7 +224,7 @@ impl Lattice {
             let group = (eight * LANES) as u32;
             for row in 0..BLOCKS as u32 {
                 let row_groups = rows >> (row * LANES as u32) & 0xff;
-                let mut found = columns & row_groups * 0x0101_0101;
+                let mut found = columns & (row_groups * 0x0101_0101);
                 while found != 0 {
                     let bit = found.trailing_zeros();
                     found &= found - 1;

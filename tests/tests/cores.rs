@@ -469,7 +469,6 @@ fn hard_scenes_agree_in_a_million_pairs() {
         total.borrow_mut().add(tally);
     });
     let total = total.into_inner();
-    println!("{total:#?}");
     assert!(total.pairs >= 1_000_000, "{}", total.pairs);
     assert!(total.fragments >= 1_000_000, "{}", total.fragments);
     total.expect(&SORTS, 100);
@@ -587,7 +586,6 @@ fn sheets_agree() {
         }
     });
     let layers = layers.into_inner();
-    println!("pixels by number of layers: {layers:?}");
     for count in 0..6 {
         assert!(layers.get(&count).is_some_and(|&pixels| pixels > 100), "{layers:?}");
     }

@@ -147,8 +147,8 @@ impl Kernel for CheckPair {
         let other = b.less_or_equal(L::splat(0.0));
         check_mask("&", less & other, |i| x[i] < y[i] && y[i] <= 0.0);
         check_mask("|", less | other, |i| x[i] < y[i] || y[i] <= 0.0);
-        check_mask("and not", less.and_not(other), |i| x[i] < y[i] && !(y[i] <= 0.0));
-        check_mask("or not", less.or_not(other), |i| x[i] < y[i] || !(y[i] <= 0.0));
+        check_mask("and not", less.and_not(other), |i| x[i] < y[i] && (y[i] > 0.0 || y[i].is_nan()));
+        check_mask("or not", less.or_not(other), |i| x[i] < y[i] || y[i] > 0.0 || y[i].is_nan());
 
         // Masks and numbers.
         check("number & mask", &lanes(a & less), |i| if x[i] < y[i] { x[i] } else { 0.0 });
