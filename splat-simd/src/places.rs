@@ -166,3 +166,177 @@ impl<L: Lanes> RowSpans<L> {
         self.half_width * (height * self.correlation + narrowing * square.square_root())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{Kernel, Level};
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+    use splat_core::evaluate::SplatConstants;
+    use splat_core::setup::Outline;
+
+    /// [`RowSpans::eight_rows`] of an outline, the splat's pixel being that of row 0 and column 0.
+    struct Rows {
+        outline: Outline,
+        reach: f32,
+        row: i32,
+    }
+
+    impl Kernel for Rows {
+        type Output = [Eight; 2];
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> [Eight; 2] {
+            RowSpans::<L>::new(&splat(self.outline, PixelRect::new(0, 0, 1, 1)), self.reach)
+                .eight_rows(self.row)
+        }
+    }
+
+    /// A splat of which nothing but the outline and the bounds matters.
+    fn splat(outline: Outline, bounds: PixelRect) -> VisibleSplat {
+        let constants = SplatConstants {
+            xi: 0,
+            yi: 0,
+            xf: 0.0,
+            yf: 0.0,
+            h: [0.0; 2],
+            a1: 0.0,
+            b: [0.0; 2],
+            reference: [0.0; 2],
+            centred: true,
+            depth: 1.0,
+            depth_slope: [0.0; 2],
+            defocus: 0.0,
+            lens_slope: [0.0; 2],
+            edge_on: 0.0,
+        };
+        VisibleSplat {
+            constants,
+            bounds,
+            outline,
+            index: 0,
+            weight_scale: 1.0,
+            back: false,
+            flips: false,
+            plain: true,
+            certain: true,
+        }
+    }
+
+    /// The first and the end column of the pixels of a row of which a sample may lie within an outline, if its samples
+    /// are at most `reach` off its middle per axis; `None` if there is none.
+    fn exact_span(outline: &Outline, reach: f64, row: i32) -> Option<[i32; 2]> {
+        let Outline { center, half_width, inverse_half_height, correlation, narrowing } = *outline;
+        let [cx, cy] = center.map(f64::from);
+        let [half_width, scale, slant, width] =
+            [half_width, inverse_half_height, correlation, narrowing].map(f64::from);
+        let middle = f64::from(row) + 0.5 - cy;
+        let [low, high] = [((middle - reach) * scale).max(-1.0), ((middle + reach) * scale).min(1.0)];
+        if low > high {
+            return None;
+        }
+        // x = t c +- n sqrt(1 - t^2) is sin(angle + const) for t = sin(angle): step through the angles, all too finely.
+        let [from, to] = [low.asin(), high.asin()];
+        let [mut left, mut right] = [f64::INFINITY, f64::NEG_INFINITY];
+        for step in 0..=2000 {
+            let angle = from + (to - from) * f64::from(step) / 2000.0;
+            let (t, n) = (angle.sin() * slant, angle.cos() * width);
+            left = left.min(half_width * (t - n));
+            right = right.max(half_width * (t + n));
+        }
+        let start = (cx + left - reach - 0.5).ceil() as i32;
+        let end = (cx + right + reach - 0.5).floor() as i32 + 1;
+        Some([start, end.max(start)])
+    }
+
+    fn outline() -> impl Strategy<Value = Outline> {
+        let size = || (-6.0f32..7.0).prop_map(f32::exp2);
+        // Slanted ones all but to a line.
+        let angle = prop_oneof![3 => -1.57f64..1.57, 1 => 1.55..1.5707, 1 => -1.5707..-1.55, 1 => Just(0.0)];
+        (-8.0f32..8.0, -8.0f32..8.0, size(), size(), angle).prop_map(|(x, y, width, height, angle)| Outline {
+            center: [x, y],
+            half_width: width,
+            inverse_half_height: 1.0 / height,
+            correlation: angle.sin() as f32,
+            narrowing: angle.cos() as f32,
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 2000,
+            failure_persistence: None,
+            // The same cases in every run.
+            rng_seed: RngSeed::Fixed(1),
+            ..ProptestConfig::default()
+        })]
+
+        #[test]
+        fn rows_hold_the_padded_outline_and_little_more(
+            outline in outline(),
+            reach in prop_oneof![Just(0.5f32), Just(1.0), Just(1.5)],
+            row in -12i32..5,
+        ) {
+            for level in Level::available() {
+                let [starts, ends] = level.run(Rows { outline, reach, row });
+                for i in 0..LANES {
+                    let [start, end] = [starts[i] as i32, ends[i] as i32];
+                    let span = |padding: f64| exact_span(&outline, f64::from(reach) + padding * BOX_PADDING, row + i as i32);
+                    // Padded by half as much it lies within, padded by twice as much without.
+                    if let Some([first, last]) = span(0.5) {
+                        prop_assert!(start <= first && last <= end.max(start), "{first}..{last} in {start}..{end}");
+                    }
+                    match span(2.0) {
+                        Some([first, last]) => prop_assert!(first <= start && end <= last, "{start}..{end} in {first}..{last}"),
+                        None => prop_assert!(end <= start, "{start}..{end} where nothing is"),
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn lists_hold_the_rows_within_bounds_and_region(
+            outline in prop_oneof![4 => outline(), 1 => Just(Outline::EVERYTHING)],
+            [x0, y0] in [-20i32..20, -20i32..20],
+            [width, height] in [1i32..40, 1i32..40],
+            crop in [0i32..32, 0i32..32, 1i32..33, 1i32..33],
+            tile in [-1i32..2, -1i32..2],
+        ) {
+            struct Fill<'a>(&'a mut PlaceList, &'a VisibleSplat, PixelRect);
+            impl Kernel for Fill<'_> {
+                type Output = ();
+                #[inline(always)]
+                fn run<L: Lanes>(self) {
+                    self.0.fill::<L>(self.1, &self.2, 1.5);
+                }
+            }
+            let corner = tile.map(|tile| tile * TILE);
+            let [left, top, crop_width, crop_height] = crop;
+            let region = PixelRect::new(corner[0] + left, corner[1] + top, corner[0] + left + crop_width, corner[1] + top + crop_height)
+                .intersect(&PixelRect::new(corner[0], corner[1], corner[0] + TILE, corner[1] + TILE));
+            let splat = splat(outline, PixelRect::new(x0, y0, x0 + width, y0 + height));
+            let candidates = splat.bounds.intersect(&region);
+            for level in Level::available() {
+                let mut expected = Vec::new();
+                for y in candidates.y0..candidates.y1.max(candidates.y0) {
+                    let [starts, ends] = level.run(Rows { outline, reach: 1.5, row: y });
+                    let [start, end] = if outline.is_known() { [starts[0] as i32, ends[0] as i32] } else { [-99, 99] };
+                    expected.extend((start.max(candidates.x0)..end.min(candidates.x1)).map(|x| [x, y]));
+                }
+                let mut list = PlaceList::default();
+                // Twice: nothing of the first time may remain.
+                for _ in 0..2 {
+                    level.run(Fill(&mut list, &splat, region));
+                    let places = list.places().iter();
+                    let found: Vec<[i32; 2]> = places.map(|&place| {
+                        let [x, y] = pixel_of(place);
+                        assert_eq!(list.offset(place), [(corner[0] + x) as f32, (corner[1] + y) as f32]);
+                        [corner[0] + x, corner[1] + y]
+                    }).collect();
+                    prop_assert_eq!(&found, &expected);
+                }
+            }
+        }
+    }
+}

@@ -6,7 +6,7 @@
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
-use splat_abuffer::{Coverage, Fragment, Resolve, Thickness};
+use splat_abuffer::{Coverage, Fragment, MIN_LAYER_WEIGHT, Resolve, Thickness};
 use splat_core::raster::{Form, SamplePlace};
 use splat_core::render::Frame;
 use splat_core::setup::VisibleSplat;
@@ -461,7 +461,7 @@ const SORTS: [&str; 58] = [
 fn hard_scenes_agree_in_a_million_pairs() {
     let total = RefCell::new(Tally::default());
     let scene = (0u64..1_000_000, camera(), options(), knowledge());
-    check(80, 1, scene, |(seed, camera, options, known)| {
+    check(64, 1, scene, |(seed, camera, options, known)| {
         let (cloud, kinds) = adversarial(98, seed, &camera, known);
         let tally = check_fragments(&cloud, &camera, &options, &kinds);
         let memory = TILE_MEMORY[seed as usize % 3];
@@ -539,6 +539,73 @@ fn hits_on_the_very_limits_agree() {
         }
     }
     assert!(on_the_rim >= 4, "{on_the_rim} samples on a rim");
+}
+
+/// Layers of which the sum of weights is just what it takes to be there.
+#[test]
+fn weights_on_the_very_thresholds_agree() {
+    let camera = orthographic(16, 16, 40.0);
+    for (resolve, threshold) in [(OPAQUE, 0.5), (soft(1.0), MIN_LAYER_WEIGHT)] {
+        let options = RenderOptions {
+            resolve,
+            // 1 throughout the first bin.
+            kernel: Kernel::Gaussian,
+            table: TableMode::Floor256,
+            samples: 4,
+            ..RenderOptions::default()
+        };
+        let integral = Kernel::Gaussian.integral(options.cutoff);
+        let mut found = 0;
+        for i in 0..30 {
+            // Rounded, the weight is the threshold or next to it.
+            let size = 0.4 + 0.01 * i as f32;
+            let area = f64::from(threshold) * f64::from(size).powi(2) * integral;
+            let cloud = Cloud {
+                normals: vec![Vec3::NEG_Z],
+                shapes: Shapes::Discs(vec![size]),
+                areas: Some(vec![area as f32]),
+                oriented: true,
+                ..Cloud::from_points(&[DVec3::new(0.0, 0.0, 4.0)])
+            };
+            let mut on_threshold = 0;
+            splat_core::fragments(&cloud, &camera, &options, &mut |_, _, fragment| {
+                on_threshold += usize::from(fragment.weight == threshold);
+            })
+            .unwrap();
+            found += usize::from(on_threshold > 10);
+            check_pictures(&cloud, &camera, &options, &[1], &TILE_MEMORY[2..]);
+        }
+        assert!(found >= 10, "{found} of 30");
+    }
+}
+
+/// Small splats far out of focus, for which the fast core takes another way than for others.
+#[test]
+fn large_circles_of_confusion_agree() {
+    let counts = RefCell::new([0; 2]);
+    let lens =
+        (0.1..0.6, prop_oneof![0.3..1.0, 8.0..40.0, Just(f64::INFINITY)], prop_oneof![Just(0u32), 3u32..7]);
+    let memory = prop_oneof![Just(1usize), Just(20_000), Just(64 << 20)];
+    let case = (0u64..1_000_000, lens, options(), memory, (any::<bool>(), 0.002..0.02));
+    check(24, 4, case, |(seed, (radius, focus, blades), options, memory, (opaque, size))| {
+        let mut cloud = jumble(60, size, seed);
+        if opaque {
+            cloud.opacities = None;
+        }
+        let camera = with_lens(pinhole(72, 52, 150.0), Lens { radius, focus, blades });
+        check_fragments(&cloud, &camera, &options, &[]);
+        check_pictures(&cloud, &camera, &options, &[2], &[memory]);
+        let level = Level::Portable;
+        let by_pixels =
+            splat_simd::fragments(&cloud, &camera, &options, level, Method::Pixels, &mut |_, _, _| {})
+                .unwrap();
+        let options = RenderOptions { tile_memory: 64 << 20, ..options };
+        let mut renderer = Renderer::new(1, level).unwrap();
+        let tests = renderer.render(&cloud, &camera, &options, &mut |_| {}).unwrap().statistics.tests;
+        counts.borrow_mut()[usize::from(tests < by_pixels)] += 1;
+    });
+    let [one_way, another] = counts.into_inner();
+    assert!(another > 8, "{another} of {} were drawn by lens points", one_way + another);
 }
 
 // ---------------------------------------------------------------------------------------------------------
