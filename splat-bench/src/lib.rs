@@ -1,6 +1,10 @@
-//! Scenes for the benchmarks.
+//! Scenes for the benchmarks: [`Case`] names one.
 
 #![forbid(unsafe_code)]
+
+mod case;
+
+pub use case::{Blur, Case, Scene, Subject};
 
 use glam::{DMat4, DVec2, DVec3};
 use splat_core::prepare::{PrepareOptions, prepare};
