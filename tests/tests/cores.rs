@@ -1,6 +1,6 @@
 //! The fast core against the reference: the same fragments and the same pictures, bit for bit, at every level.
 //!
-//! `SPLAT_CASES=N` tries N times as many cases of everything, all of them others than those of N = 1 for the most part:
+//! `SPLAT_CASES=N` tries N times as many cases of everything, the usual ones among them:
 //! `SPLAT_CASES=20 cargo test -p splat-tests --test cores`.
 
 use glam::{DQuat, DVec3, Vec3};
