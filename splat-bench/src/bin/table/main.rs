@@ -66,9 +66,11 @@ fn tables(cases: &[Case], repetitions: usize) -> anyhow::Result<()> {
             continue;
         };
         for &case in cases {
-            eprintln!("{case}");
             let memory = memory::of_child(case);
-            all.push(measure::Measured { memory, ..measure::case(case, &cloud, repetitions)? });
+            let measured = measure::Measured { memory, ..measure::case(case, &cloud, repetitions)? };
+            // Not to be lost if the rest is given up.
+            eprintln!("{}", markdown::tables(std::slice::from_ref(&measured)));
+            all.push(measured);
         }
     }
     println!("{}", markdown::tables(&all));
