@@ -2,7 +2,7 @@
 
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Lattice};
-use crate::places::{PlaceList, place_of};
+use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::ResolveJob;
@@ -271,7 +271,8 @@ impl<'a> Picture<'a> {
 
     /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
     fn lattice_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&Lattice> {
-        let lattice = self.lattice.as_ref()?;
+        // A lattice's cells spread over the tile, whatever small part of it is asked for.
+        let lattice = self.lattice.as_ref().filter(|_| region.area() >= PLACES / 2)?;
         let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
         let gain: f64 = splats.map(|splat| lattice.gain(splat, region)).sum();
         (gain > 0.0).then_some(lattice)
