@@ -1,8 +1,8 @@
 //! The fast surfel renderer: eight subpixel samples at once, tiles in parallel, and the bits of the reference.
 //!
-//! The kernels are written once over the small trait [`Lanes`] and run on `wide::f32x8` anywhere, and on AVX2 registers
-//! where the processor has them, chosen once a frame ([`Level`]). What it draws is what [`splat_core::render()`] draws, bit
-//! for bit: same set-up, same evaluation in the same rounding order, same resolve.
+//! The kernels are written once over a small trait of lanes and run on `wide::f32x8` anywhere, and on AVX2 or AVX-512
+//! registers where the processor has them, chosen once a frame ([`Level`]). What it draws is what [`splat_core::render()`]
+//! draws, bit for bit: same set-up, same evaluation in the same rounding order, same resolve.
 
 mod compare;
 mod evaluate;
