@@ -18,6 +18,7 @@ pub mod render;
 pub mod sampling;
 pub mod setup;
 pub mod srgb;
+pub mod texture;
 
 pub use camera::{Camera, Lens, Projection};
 pub use cloud::{Cloud, Defect, Shapes};

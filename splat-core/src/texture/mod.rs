@@ -1,0 +1,13 @@
+//! Textures: where a lookup falls, how much of the texture it must average, and how that average is made.
+//!
+//! Sources: seeds 0 to 3 (Ptex filter footprints, pbrt MIP maps with EWA, Footprint Assembly, pbrt chapter 11),
+//! with the errata of docs/specification.md, section 7.
+
+pub mod differentials;
+pub mod filter;
+pub mod footprint;
+pub mod function;
+pub mod mapping;
+pub mod pyramid;
+
+pub use footprint::{Footprint, FullSides};

@@ -1,0 +1,1 @@
+//! An image in levels of falling resolution. Seed 1.
