@@ -347,3 +347,79 @@ pub const WEIGHT_F32: f64 = 6e-7;
 
 /// Linear interpolation in 256 bins at F = 2, relative: 1.9e-6 (notes, E18), and 2.5 roundings of f32.
 pub const LERP_F2: f64 = 2.1e-6;
+
+// Footprints, differentials and mappings.
+
+/// The determinant of a 2x2 matrix of `f32` in `f64`: both products are exact, their difference is rounded once.
+/// Measured: 1.1e-16.
+pub const DETERMINANT: f64 = EPS;
+
+/// The product of a well-conditioned 2x2 matrix (condition below 100) and its inverse, against 1: some six roundings, times the
+/// condition. Measured: 3e-15.
+pub const INVERSE: f64 = 600.0 * EPS;
+
+/// A footprint that was rounded to `f32`, relative: half a unit in the last place, and what `f64` adds.
+pub const FOOTPRINT_F32: f64 = 6.0e-8;
+
+/// Semi-axes and products of a footprint's principal axes, relative to the major one: some ten roundings of `f64`.
+pub const PRINCIPAL: f64 = 20.0 * EPS;
+
+/// A derivative in `f64` against extrapolated central differences (error h^4 f'''''/480 and eps/h), of functions whose
+/// coordinates and derivatives are below about 10, at h = 1e-3: 1e-12 times a fifth derivative of up to 1e4, and 1e-12.
+/// Measured: 3e-10.
+pub const CENTRAL_DIFFERENCE: f64 = 1e-8;
+
+/// The splat's derivatives from constants in `f32` against differences of the same `f32` constants' evaluation in `f64`,
+/// relative to the largest: as above, at h = 1e-3 pixel. Measured: see the test.
+pub const SPLAT_DERIVATIVE: f64 = 1e-8;
+
+/// A point of the tangent plane, n.p + d: some six roundings of numbers below 10. Measured: 1.8e-15.
+pub const ON_PLANE: f64 = 120.0 * EPS;
+
+/// How a direction changes from one ray to another 1e-5 away, against the derivative, relative: of the first order in the
+/// distance, times second derivatives of up to 10. Measured: see the tests of errata F10 and F11.
+pub const FIRST_ORDER: f64 = 1e-4;
+
+/// Where a camera's ray is on the picture, in pixels: a pose of up to 5 units, scaled by 1/2 to 2 and inverted, some thirty
+/// roundings of numbers below 100, times 90 pixels a unit. Measured: see the test.
+pub const RAY_PIXEL: f64 = 300_000.0 * EPS;
+
+/// Neighbours on a plane by two formulas: the same pose, and planes that are up to 50 degrees steep: some thirty roundings of
+/// numbers below 30.
+pub const NEIGHBOUR: f64 = 3000.0 * EPS;
+
+/// The derivative of a splat by its constants rounded to `f32` (2^-24 each, ten of them, and where the lens makes g small ten
+/// times that), relative.
+pub const SPLAT_CONSTANTS: f64 = 1e-5;
+
+/// As [`FIRST_ORDER`], over many surfaces, with incidence up to 73 degrees, curvatures up to 2 and refraction to within .1 of
+/// the critical cosine: second derivatives of up to 1000.
+pub const FIRST_ORDER_MANY: f64 = 1e-2;
+
+/// Directions of rays 1e-3 apart that are brought to unit length by way of their first derivative: half of the square of
+/// 1e-3, twice.
+pub const SECOND_ORDER: f64 = 1.5e-6;
+
+/// acos(z) and atan2 of the same point in `f64`: eps/sin(theta) for the former, of random points of a cube, the nearest of which
+/// to a pole are 1e-3 from it, over pi.
+pub const ACOS: f64 = 1000.0 * EPS;
+
+/// A checkerboard's mean over up to 3 x 3 checks by 64 x 64 midpoints: four edges in each direction, each off by up to
+/// half a sample of 64, of an amplitude of 2 halved: 8/64 of half the amplitude.
+pub const CHECKS_BY_4096: f64 = 0.5 * 8.0 / 64.0;
+
+/// The root mean square of that: up to 8 edges, each uniformly off by half a sample of 64 (sqrt(8/12)/64), halved; fewer edges in
+/// most of the boxes. Measured: see the test.
+pub const CHECKS_BY_4096_RMS: f64 = 0.0065;
+
+/// The clamped spectrum against the mean over an ellipse: 2 J1(w)/w is .71 at w = pi/2 (1/4 cycle), where all is kept, .18 at w =
+/// pi, where nothing is.
+pub const CLAMPING: f64 = 0.29;
+
+/// A smooth function's mean by 64 x 64 strata: in each it varies by up to pi/32 of an amplitude of 1 with slopes of up to 10,
+/// over the root of their number. Measured: see the test.
+pub const SUPERSAMPLED: f64 = 1e-3;
+
+/// A function with edges: strata along up to 400 of the 4096 are cut by one, of a variance of 1/4 at most, four standard
+/// deviations, and the same of the truth.
+pub const SUPERSAMPLED_EDGES: f64 = 2.0 * 4.0 * 10.0 / 4096.0;

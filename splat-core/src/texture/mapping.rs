@@ -189,7 +189,8 @@ pub fn difference_quotient(
     (difference - turns) / delta
 }
 
-/// A point and its derivatives in the texture's space, divided by `scale` so that nothing overflows.
+/// A point and its derivatives in the texture's space, divided by `scale`, a power of 2, so that nothing overflows
+/// and no digit is lost.
 struct Local {
     scale: f64,
     point: DVec3,
@@ -200,8 +201,9 @@ impl Local {
     /// `None` at the centre, and for a point that is not finite.
     fn new(world_to_texture: &DAffine3, at: &SpacePoint) -> Option<Self> {
         let SpacePoint { point, dx, dy } = SolidMapping { world_to_texture: *world_to_texture }.map(at);
-        let scale = point.abs().max_element();
-        let usable = point.is_finite() && scale > 0.0;
+        let longest = point.abs().max_element();
+        let usable = point.is_finite() && longest > 0.0;
+        let scale = libm::scalbn(1.0, libm::ilogb(longest));
         usable.then(|| Self { scale, point: point / scale, changes: [dx / scale, dy / scale] })
     }
 
