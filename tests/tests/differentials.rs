@@ -220,7 +220,6 @@ fn splats_know_their_own_derivatives() {
             worst = worst.max((found.x - truth.x).length().max((found.y - truth.y).length()) / scale);
         }
     }
-    println!("worst {worst:e}");
     assert!(worst <= tol::SPLAT_DERIVATIVE, "{worst:e}");
 }
 
@@ -345,7 +344,6 @@ fn reflection_and_refraction_follow_traced_neighbours() {
             bent = bent.max(error(change(&sent), [truth[0], slope]));
         }
     }
-    println!("reflected {mirrored:e}, refracted {bent:e}");
     assert!(mirrored <= tol::FIRST_ORDER_MANY, "{mirrored:e}");
     assert!(bent <= tol::FIRST_ORDER_MANY, "{bent:e}");
 }

@@ -95,8 +95,8 @@ fn square_wave_mean(x: f64, half: f64) -> f64 {
 
 /// Octaves of gradient noise, each of a higher frequency and a lower amplitude: fractional Brownian motion. Mean 0.
 ///
-/// Band limited by clamping: octave i, whose spectrum is around lacunarity^i cycles a unit, keeps the share
-/// [`clamped_spectrum`] of the longer of dx and dy, since noise is alike in all directions.
+/// Band limited by clamping: octave i, taken for a wave of [`NOISE_CYCLES`] lacunarity^i cycles a unit, keeps the share
+/// [`clamped_spectrum`] of its cycles along the longer of dx and dy, since noise is alike in all directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fbm {
     /// Number of octaves, at most [`MAX_OCTAVES`] of which count.
@@ -108,6 +108,10 @@ pub struct Fbm {
     /// Which noise.
     pub seed: u32,
 }
+
+/// Where the spectrum of [`gradient_noise`] is, in cycles a unit: its mean over a disc of radius 1/2, 3/4 and 1 keeps .67,
+/// .41 and .23 of it, and that of a wave of 1/2 cycle a unit .72, .40 and .18.
+pub const NOISE_CYCLES: f64 = 0.5;
 
 /// Greatest number of octaves.
 pub const MAX_OCTAVES: u32 = 32;
@@ -121,7 +125,7 @@ impl TextureFunction for Fbm {
         let longest = at.dx.length().max(at.dy.length());
         let (mut sum, mut frequency, mut amplitude) = (0.0, 1.0, 1.0);
         for octave in 0..self.octaves.min(MAX_OCTAVES) {
-            let share = clamped_spectrum(frequency * longest);
+            let share = clamped_spectrum(NOISE_CYCLES * frequency * longest);
             if share > 0.0 {
                 sum +=
                     share * amplitude * gradient_noise(frequency * at.point, self.seed.wrapping_add(octave));
