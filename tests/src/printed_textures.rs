@@ -1,5 +1,6 @@
-//! Footprints, differentials and mappings as printed: seed 0 (the Ptex filter footprint), seed 3 (pbrt, chapter 11), and what
-//! later versions of pbrt made of them, faults included. What the errata tests show to be wrong.
+//! Footprints, differentials and mappings as printed: seed 0 (the Ptex filter footprint), seed 3 (pbrt,
+//! chapter 11), and what later versions of pbrt made of them, faults included. What the errata tests show to
+//! be wrong.
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -49,8 +50,9 @@ pub fn sphere_derivative(p: DVec3, dp: DVec3, delta: f64) -> DVec2 {
     DVec2::new(d.x, correct_seam(d.y))
 }
 
-/// `[ds/dx, dt/dx, ds/dy, dt/dy]` of the spherical mapping with every misprint of section 11.2.2: the second call writes to sx and
-/// tx, so that sy and ty (0 here) are never set, and the last correction changes dt/dx (erratum F3).
+/// `[ds/dx, dt/dx, ds/dy, dt/dy]` of the spherical mapping with every misprint of section 11.2.2: the second
+/// call writes to sx and tx, so that sy and ty (0 here) are never set, and the last correction changes dt/dx
+/// (erratum F3).
 pub fn sphere_derivatives_with_misprints(p: DVec3, dpdx: DVec3, dpdy: DVec3) -> [f64; 4] {
     let delta = 0.1;
     let st = sphere(p);
@@ -69,13 +71,15 @@ pub fn sphere_derivatives_with_misprints(p: DVec3, dpdx: DVec3, dpdy: DVec3) -> 
     [dsdx, dtdx, dsdy, dtdy]
 }
 
-/// d(s, t)/dx of the cylindrical mapping as in pbrt-v2 and v3, which corrects t (erratum F5); their delta is .01.
+/// d(s, t)/dx of the cylindrical mapping as in pbrt-v2 and v3, which corrects t (erratum F5); their delta is
+/// .01.
 pub fn cylinder_derivative(p: DVec3, dp: DVec3, delta: f64) -> DVec2 {
     let d = (cylinder(p + delta * dp) - cylinder(p)) / delta;
     DVec2::new(d.x, correct_seam(d.y))
 }
 
-/// d(s, t)/dx of the spherical mapping in pbrt-v4: (s, t) is (theta, phi), the derivatives are (dphi, dtheta) (erratum F6).
+/// d(s, t)/dx of the spherical mapping in pbrt-v4: (s, t) is (theta, phi), the derivatives are (dphi, dtheta)
+/// (erratum F6).
 pub fn sphere_derivative_v4(p: DVec3, dp: DVec3) -> DVec2 {
     let rho2 = p.x * p.x + p.y * p.y;
     let dphi = DVec3::new(-p.y, p.x, 0.0) / (TAU * rho2);
@@ -83,7 +87,8 @@ pub fn sphere_derivative_v4(p: DVec3, dp: DVec3) -> DVec2 {
     DVec2::new(dphi.dot(dp), dtheta.dot(dp))
 }
 
-/// The 2x2 solver of pbrt, with its absolute test (erratum F8), and the fallback of v1 for x (erratum F9): the whole texture.
+/// The 2x2 solver of pbrt, with its absolute test (erratum F8), and the fallback of v1 for x (erratum F9):
+/// the whole texture.
 pub fn solve(a: [[f64; 2]; 2], b: [f64; 2]) -> [f64; 2] {
     let det = a[0][0] * a[1][1] - a[0][1] * a[1][0];
     if det.abs() < 1e-10 {

@@ -39,8 +39,8 @@ pub fn vector(rng: &mut Random, r: f64) -> DVec3 {
     DVec3::new(rng.range(-r, r), rng.range(-r, r), rng.range(-r, r))
 }
 
-/// The derivative of `f` at 0, by Richardson's extrapolation of central differences of `step` and half of it: its error is of
-/// the fourth order in `step`.
+/// The derivative of `f` at 0, by Richardson's extrapolation of central differences of `step` and half of it:
+/// its error is of the fourth order in `step`.
 pub fn derivative(f: impl Fn(f64) -> DVec3, step: f64) -> DVec3 {
     let central = |h: f64| (f(h) - f(-h)) / (2.0 * h);
     (4.0 * central(0.5 * step) - central(step)) / 3.0

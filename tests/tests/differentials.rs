@@ -1,13 +1,14 @@
 //! Ray differentials and the derivatives of splats, against traced neighbours and finite differences.
 
-use glam::{DMat2, DMat4, DQuat, DVec2, DVec3, Vec2};
+use glam::{DAffine3, DMat2, DMat4, DQuat, DVec2, DVec3, Vec2};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use splat_core::evaluate::{LensPoint, Limits, SplatConstants};
 use splat_core::setup::{CameraSplat, View, project};
 use splat_core::texture::footprint::MAX_COMPONENT;
 use splat_core::texture::{
-    Footprint, FullSides, PixelDerivatives, Ray, RayDifferential, Surface, SurfaceDifferentials,
+    Footprint, FullSides, PixelDerivatives, Ray, RayDifferential, SpacePoint, SphericalMapping, Surface,
+    SurfaceDifferentials,
 };
 use splat_core::{Camera, Lens, Projection, RenderOptions};
 use splat_tests::random::Random;
@@ -224,7 +225,8 @@ fn splats_know_their_own_derivatives() {
 
 #[test]
 fn splats_agree_with_ray_differentials() {
-    // In the splat's own basis, after the rotation that set-up applies to it (the documentation of `of_splat`).
+    // In the splat's own basis, after the rotation that set-up applies to it (the documentation of
+    // `of_splat`).
     let mut rng = Random::new(4);
     for projection in projections() {
         for _ in 0..100 {
@@ -259,6 +261,62 @@ fn splats_agree_with_ray_differentials() {
             let scale = truth.x.length().max(truth.y.length());
             let error = (found.x - truth.x).length().max((found.y - truth.y).length()) / scale;
             assert!(error <= tol::SPLAT_CONSTANTS, "{error:e} {found:?} {truth:?}");
+        }
+    }
+}
+
+#[test]
+fn a_pixel_s_footprint_from_end_to_end() {
+    // A camera's ray, its hit on a sphere, the spherical mapping: (s, t) as the neighbours' own hits have
+    // them.
+    let mut rng = Random::new(8);
+    for projection in projections() {
+        let camera = Camera {
+            world_to_camera: DMat4::from_translation(DVec3::Z * 4.0),
+            ..camera(projection, &mut rng)
+        };
+        // Pixels a thousandth as wide: forward differences are all but derivatives.
+        let fine = |scale: f64| match projection {
+            Projection::Perspective { focal_length, lens } => {
+                Projection::Perspective { focal_length: focal_length * scale, lens }
+            }
+            Projection::Orthographic { pixels_per_unit } => {
+                Projection::Orthographic { pixels_per_unit: pixels_per_unit * scale }
+            }
+        };
+        let camera =
+            Camera { projection: fine(1000.0), principal_point: camera.principal_point * 1000.0, ..camera };
+        let mapping = SphericalMapping { world_to_texture: DAffine3::from_rotation_x(0.5) };
+        for _ in 0..50 {
+            let pixel = camera.principal_point + 1e4 * rng.in_disc();
+            let on_lens = rng.in_disc();
+            let hit = |pixel: DVec2| {
+                let ray = Ray::from_camera(&camera, pixel, on_lens);
+                let b = ray.origin.dot(ray.direction);
+                let root = b * b - ray.origin.length_squared() + 1.0;
+                ray.origin - (b + root.sqrt()) * ray.direction
+            };
+            let p = hit(pixel);
+            assert!(p.is_finite());
+            let [dx, dy] = RayDifferential::from_camera(&camera, pixel, on_lens).on_tangent_plane(p, p);
+            let found = mapping.map(&SpacePoint { point: p, dx, dy }).derivatives;
+            let st = |pixel| mapping.map(&SpacePoint { point: hit(pixel), ..SpacePoint::default() }).st;
+            let truth = [DVec2::X, DVec2::Y].map(|step| {
+                derivative_2d(
+                    |h| {
+                        let d = st(pixel + h * step) - st(pixel);
+                        d - d.round()
+                    },
+                    1.0,
+                )
+            });
+            let error = (found.x - truth[0]).length().max((found.y - truth[1]).length());
+            let relative = error / truth[0].length().max(truth[1].length());
+            assert!(relative <= tol::FIRST_ORDER_MANY, "{relative:e}");
+            // As the two kinds of footprints have them.
+            let [semi_axes, sides] = [found.semi_axes().semi_axes, found.full_sides().sides];
+            assert_eq!(semi_axes, [found.x.as_vec2(), found.y.as_vec2()]);
+            assert_eq!(semi_axes, sides);
         }
     }
 }
@@ -401,6 +459,15 @@ fn principal_axes_keep_the_ellipse() {
         assert!((half.x - m(DVec2::X).sqrt()).abs() <= tol::PRINCIPAL * axes.major);
         assert!((half.y - m(DVec2::Y).sqrt()).abs() <= tol::PRINCIPAL * axes.major);
     }
+    // However thin, and along either axis.
+    for (along, expected) in
+        [(Vec2::new(1e-6, 1.0), 1e-6), (Vec2::new(0.0, -3.0), 0.0), (Vec2::new(1.0, 1e-6), 1e6)]
+    {
+        let axes = Footprint::new(Vec2::ZERO, along).principal_axes();
+        let ratio = axes.direction.x / axes.direction.y;
+        assert!((ratio - expected).abs() <= 2.0 * tol::FOOTPRINT_F32 * expected, "{axes:?}");
+        assert_eq!(axes.minor, 0.0);
+    }
     // A circle, nothing, and a line.
     let circle = Footprint::new(Vec2::new(3.0, 4.0), Vec2::new(-4.0, 3.0)).principal_axes();
     assert_eq!((circle.direction, circle.major, circle.minor), (DVec2::X, 5.0, 5.0));
@@ -429,7 +496,9 @@ fn is_bounded(derivatives: &PixelDerivatives) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 20_000, rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 20_000, rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_footprint_is_unbounded(v in prop::array::uniform4(any_f32())) {

@@ -1,5 +1,5 @@
-//! The errata of seed 0 (the Ptex filter footprint) and seed 3 (pbrt, chapter 11), each by its name: the printed form is wrong
-//! by about as much as the erratum says, and ours is right.
+//! The errata of seed 0 (the Ptex filter footprint) and seed 3 (pbrt, chapter 11), each by its name: the
+//! printed form is wrong by about as much as the erratum says, and ours is right.
 
 use glam::{DAffine3, DMat2, DVec2, DVec3, Vec2};
 use splat_core::texture::footprint::SINGULAR;
@@ -56,8 +56,9 @@ fn seed_0_inverse_and_chain_rule_are_right() {
     assert!(chain <= tol::EXACT, "{chain:e}");
 }
 
-/// For random vectors that lie nearly along each other, sin(angle) log-uniform in a range: the sorted relative errors of the
-/// determinant in `f32`, the share of them whose sign is wrong or which are zero, and the greatest error of ours.
+/// For random vectors that lie nearly along each other, sin(angle) log-uniform in a range: the sorted
+/// relative errors of the determinant in `f32`, the share of them whose sign is wrong or which are zero, and
+/// the greatest error of ours.
 fn errors_of_determinants(least: f64, greatest: f64) -> (Vec<f64>, f64, f64) {
     let mut rng = Random::new(1);
     let (mut errors, mut wrong, mut ours) = (vec![], 0, 0.0_f64);

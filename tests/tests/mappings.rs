@@ -1,4 +1,5 @@
-//! Mappings: their analytic derivatives against finite differences, away from seams, across them, and where there are none.
+//! Mappings: their analytic derivatives against finite differences, away from seams, across them, and where
+//! there are none.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use proptest::prelude::*;
@@ -157,6 +158,7 @@ fn coordinates_are_the_seed_s() {
     // Poles: theta is 0 on +z and pi on -z. The seams.
     assert_eq!(sphere.st(DVec3::Z), DVec2::ZERO);
     assert_eq!(sphere.st(DVec3::NEG_Z), DVec2::new(1.0, 0.0));
+    assert_eq!(sphere.st(DVec3::new(-0.0, -0.0, 1.0)), DVec2::ZERO);
     assert_eq!(sphere.st(DVec3::Y), DVec2::new(0.5, 0.25));
     assert_eq!(cylinder.st(DVec3::X), DVec2::new(0.5, 0.0));
     assert_eq!(cylinder.st(DVec3::NEG_X), DVec2::new(1.0, 0.0));
@@ -231,12 +233,15 @@ proptest! {
 
     #[test]
     fn derivatives_are_bounded_whatever_the_numbers(
-        v in prop::array::uniform7(any_vector()), uv in prop::array::uniform4(any_f64()), identity in any::<bool>()
+        v in prop::array::uniform7(any_vector()),
+        uv in prop::array::uniform2(any_f64()),
+        identity in any::<bool>()
     ) {
         let any = DAffine3::from_mat3_translation(DMat3::from_cols(v[3], v[4], v[5]), v[6]);
         let world_to_texture = if identity { DAffine3::IDENTITY } else { any };
         let at = SpacePoint { point: v[0], dx: v[1], dy: v[2] };
-        let bounded = |d: &PixelDerivatives| [d.x, d.y].iter().all(|d| d.abs().max_element() <= MAX_COMPONENT);
+        let bounded =
+            |d: &PixelDerivatives| d.x.abs().max(d.y.abs()).max_element() <= MAX_COMPONENT && !d.x.is_nan();
         for mapping in mappings(world_to_texture) {
             let found = (mapping.map)(&at);
             prop_assert!(bounded(&found.derivatives), "{:?}", found);

@@ -34,7 +34,8 @@ fn mean_over_ellipse(function: &impl TextureFunction, at: &SpacePoint) -> f64 {
     sum / 4096.0
 }
 
-/// The share of a wave of `cycles` from the centre to the rim of a disc that its mean over the disc keeps: 2 J1(w)/w.
+/// The share of a wave of `cycles` from the centre to the rim of a disc that its mean over the disc keeps: 2
+/// J1(w)/w.
 fn transfer(cycles: f64) -> f64 {
     let w = TAU * cycles;
     if w == 0.0 { 1.0 } else { 2.0 * libm::j1(w) / w }
@@ -123,7 +124,8 @@ fn the_spectrum_is_clamped_at_the_nyquist_limit() {
     assert!(worst <= tol::CLAMPING, "{worst}");
 }
 
-/// The root mean squares of the differences of the filtered function, and of its bare value, from the mean over the ellipse.
+/// The root mean squares of the differences of the filtered function, and of its bare value, from the mean
+/// over the ellipse.
 fn errors(function: &impl TextureFunction, lookups: &[SpacePoint]) -> [f64; 2] {
     let mut squares = [0.0; 2];
     for at in lookups {
@@ -184,7 +186,8 @@ fn noise_loses_the_octaves_that_a_pixel_cannot_show() {
     for at in lookups(1.01) {
         assert_eq!(FBM.filtered(&at), 0.0, "the mean");
     }
-    // A pixel of less than half of the finest lattice's unit: all of it. More than all of that: nothing of the finest.
+    // A pixel of less than half of the finest lattice's unit: all of it. More than all of that: nothing of
+    // the finest.
     for at in lookups(0.99 / 64.0) {
         assert_eq!(FBM.filtered(&at), FBM.value(at.point));
     }

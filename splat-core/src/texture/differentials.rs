@@ -1,5 +1,5 @@
-//! Ray differentials: how a ray's hit, direction and texture coordinates change from pixel to pixel. Seed 3, sections
-//! 11.1.1 and 11.1.3; Igehy 1999.
+//! Ray differentials: how a ray's hit, direction and texture coordinates change from pixel to pixel. Seed 3,
+//! sections 11.1.1 and 11.1.3; Igehy 1999.
 //!
 //! In `f64` and in world space, since there is one ray a pixel. No function panics, whatever its arguments.
 
@@ -21,8 +21,8 @@ pub struct Ray {
 
 /// A ray, and those of the next pixels in x and in y.
 ///
-/// All directions must be of unit length: their differences are the derivatives of a unit vector (erratum F10).
-/// [`Ray::new`] sees to it.
+/// All directions must be of unit length: their differences are the derivatives of a unit vector (erratum
+/// F10). [`Ray::new`] sees to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayDifferential {
     /// The pixel's ray.
@@ -36,7 +36,8 @@ pub struct RayDifferential {
 pub struct Surface {
     /// The point p, in world space.
     pub position: DVec3,
-    /// Its unit normal n, of either sign. Whoever turns it around must turn `normal_derivatives`, too (erratum F10).
+    /// Its unit normal n, of either sign. Whoever turns it around must turn `normal_derivatives`, too
+    /// (erratum F10).
     pub normal: DVec3,
     /// dp/du and dp/dv.
     pub position_derivatives: [DVec3; 2],
@@ -61,8 +62,8 @@ impl Ray {
         Self { origin, direction: unit(direction) }
     }
 
-    /// The camera's ray of a place of the picture, in pixels, through the point `on_lens` of the unit disc, which only
-    /// matters with a thin lens: a ray goes through P(w) = p + w (s - p/focus), notes 3.4.
+    /// The camera's ray of a place of the picture, in pixels, through the point `on_lens` of the unit disc,
+    /// which only matters with a thin lens: a ray goes through P(w) = p + w (s - p/focus), notes 3.4.
     ///
     /// Pinhole rays start at the eye, those of a lens in its plane w = 0, and so do orthographic ones.
     pub fn from_camera(camera: &Camera, pixel: DVec2, on_lens: DVec2) -> Self {
@@ -89,12 +90,12 @@ impl RayDifferential {
 
     /// dp/dx and dp/dy: from the hit `position` to where the next pixels' rays meet its tangent plane.
     ///
-    /// t = -(n.o + d)/(n.dir) with d = -n.p (the seed prints -(n.o) + d: erratum F2), here t = -n.(o - p)/(n.dir), which
-    /// keeps its digits far from the world's origin.
+    /// t = -(n.o + d)/(n.dir) with d = -n.p (the seed prints -(n.o) + d: erratum F2), here t = -n.(o -
+    /// p)/(n.dir), which keeps its digits far from the world's origin.
     ///
-    /// Where the next ray goes to the other side of the plane, because the horizon lies between them, it is the
-    /// derivative of the ray itself (Igehy's transfer), with |n.dir| taken as 1e-8 at least. The result is at most 1e8 times
-    /// as long as the ray; zero if an argument is not finite.
+    /// Where the next ray goes to the other side of the plane, because the horizon lies between them, it is
+    /// the derivative of the ray itself (Igehy's transfer), with |n.dir| taken as 1e-8 at least. The result
+    /// is at most 1e8 times as long as the ray; zero if an argument is not finite.
     pub fn on_tangent_plane(&self, position: DVec3, normal: DVec3) -> [DVec3; 2] {
         self.next.map(|next| {
             let slope = normal.dot(self.ray.direction);
@@ -115,6 +116,8 @@ impl RayDifferential {
 
     /// The rays that a perfect mirror sends on. The printed formula, which is right for unit directions:
     /// dwi = -dwo + 2 ((wo.n) dn + (dwo.n + wo.dn) n).
+    ///
+    /// What is not finite stays so; the derivatives of the next hit are zero then.
     pub fn reflected(&self, surface: &Surface, differentials: &SurfaceDifferentials) -> Self {
         let (n, wo) = (surface.normal, -self.ray.direction);
         let cosine = wo.dot(n);
@@ -126,12 +129,13 @@ impl RayDifferential {
         })
     }
 
-    /// The rays that go on into another medium; `eta` is the ratio of the index of refraction on the side of the ray to that
-    /// on the other. `None` for total internal reflection, at the critical angle, and if an argument is not finite.
+    /// The rays that go on into another medium; `eta` is the ratio of the index of refraction on the side of
+    /// the ray to that on the other. `None` for total internal reflection, at the critical angle, and if an
+    /// argument is not finite.
     ///
-    /// The seed leaves it out. With n on the side of wo (dn turned with it), k = eta, |wi.n| = sqrt(1 - k^2 (1 -
-    /// (wo.n)^2)): wi = -k wo + mu n, mu = k (wo.n) - |wi.n|, dmu = (k - k^2 (wo.n)/|wi.n|) (dwo.n + wo.dn), dwi = -k dwo +
-    /// mu dn + dmu n. (pbrt-v4 multiplies dwo by 1/k instead: erratum F11.)
+    /// The seed leaves it out. With n on the side of wo (dn turned with it), k = eta, |wi.n| = sqrt(1 - k^2
+    /// (1 - (wo.n)^2)): wi = -k wo + mu n, mu = k (wo.n) - |wi.n|, dmu = (k - k^2 (wo.n)/|wi.n|) (dwo.n +
+    /// wo.dn), dwi = -k dwo + mu dn + dmu n. (pbrt-v4 multiplies dwo by 1/k instead: erratum F11.)
     pub fn refracted(
         &self,
         surface: &Surface,
@@ -157,8 +161,9 @@ impl RayDifferential {
         result.is_finite().then_some(result)
     }
 
-    /// The rays that start at the hit and, to first order, at its neighbours (seed 3: rd.rx.o = p + dpdx). `change` gives
-    /// dwi/dx (0) or dwi/dy (1) from dwo. Unit length changes the directions to second order only.
+    /// The rays that start at the hit and, to first order, at its neighbours (seed 3: rd.rx.o = p + dpdx).
+    /// `change` gives dwi/dx (0) or dwi/dy (1) from dwo. Unit length changes the directions to second order
+    /// only.
     fn sent_on(
         &self,
         surface: &Surface,
@@ -180,7 +185,8 @@ impl RayDifferential {
 }
 
 impl Surface {
-    /// What changes how much from pixel to pixel where `ray` hits this surface (ComputeDifferentials of the seed).
+    /// What changes how much from pixel to pixel where `ray` hits this surface (ComputeDifferentials of the
+    /// seed).
     pub fn differentials(&self, ray: &RayDifferential) -> SurfaceDifferentials {
         let position = ray.on_tangent_plane(self.position, self.normal);
         let [x, y] = position.map(|offset| self.parameters_of(offset));
@@ -189,14 +195,16 @@ impl Surface {
         SurfaceDifferentials { position, parameters: PixelDerivatives { x, y }, normal }
     }
 
-    /// (du, dv) with du dp/du + dv dp/dv as near as can be to `offset`: least squares, three equations for two unknowns.
+    /// (du, dv) with du dp/du + dv dp/dv as near as can be to `offset`: least squares, three equations for
+    /// two unknowns.
     ///
-    /// By the normal equations A^t A, whose determinant |dp/du x dp/dv|^2 is had without cancellation by way of the cross
-    /// product N: du = (offset x dp/dv).N/N^2, dv = (dp/du x offset).N/N^2.
+    /// By the normal equations A^t A, whose determinant |dp/du x dp/dv|^2 is had without cancellation by way
+    /// of the cross product N: du = (offset x dp/dv).N/N^2, dv = (dp/du x offset).N/N^2.
     ///
-    /// Singular is |N| <= 2^-24 |dp/du| |dp/dv|, relative, whatever the unit of length (the printed solver takes |det| <
-    /// 1e-10 for it: erratum F8). Then it is the pseudo-inverse along the one live direction, A^t offset/|A|^2: not the
-    /// whole texture, nor a point of it (erratum F9). Bounded like [`PixelDerivatives::bounded`].
+    /// Singular is |N| <= 2^-24 |dp/du| |dp/dv|, relative, whatever the unit of length (the printed solver
+    /// takes |det| < 1e-10 for it: erratum F8). Then it is the pseudo-inverse along the one live direction,
+    /// A^t offset/|A|^2: not the whole texture, nor a point of it (erratum F9). Bounded like
+    /// [`PixelDerivatives::bounded`].
     pub fn parameters_of(&self, offset: DVec3) -> DVec2 {
         let [dpdu, dpdv] = self.position_derivatives;
         let lengths = DVec2::new(dpdu.abs().max_element(), dpdv.abs().max_element());

@@ -1,11 +1,13 @@
-//! Textures that are functions, and how their detail is limited to what a footprint can show. Seed 3, section 11.1.2.
+//! Textures that are functions, and how their detail is limited to what a footprint can show. Seed 3, section
+//! 11.1.2.
 //!
-//! Three ways, in the seed's order of preference: the mean over a box, where the integral is known ([`Checkerboard`]);
-//! *clamping*, where the spectrum is ([`Fbm`], [`ZonePlate`]): frequencies beyond the Nyquist limit become their mean; and
-//! [`supersample`] for all else.
+//! Three ways, in the seed's order of preference: the mean over a box, where the integral is known
+//! ([`Checkerboard`]); *clamping*, where the spectrum is ([`Fbm`], [`ZonePlate`]): frequencies beyond the
+//! Nyquist limit become their mean; and [`supersample`] for all else.
 //!
-//! A function of (s, t) is one of space whose z is 0: [`SpacePoint::in_plane`]. The point's derivatives dx and dy are the
-//! semi-axes of the footprint, as pbrt's are: what is as far as the next pixel. Deterministic on every platform.
+//! A function of (s, t) is one of space whose z is 0: [`SpacePoint::in_plane`]. The point's derivatives dx
+//! and dy are the semi-axes of the footprint, as pbrt's are: what is as far as the next pixel. Deterministic
+//! on every platform.
 
 use super::mapping::SpacePoint;
 use glam::{DVec2, DVec3};
@@ -19,8 +21,8 @@ pub trait TextureFunction {
     fn filtered(&self, at: &SpacePoint) -> f64;
 }
 
-/// How much of a frequency remains, given in cycles from one pixel to the next: all below 1/4, nothing (so that the mean
-/// remains) from the Nyquist limit 1/2 on, smoothly faded between. 0 for what is not a number.
+/// How much of a frequency remains, given in cycles from one pixel to the next: all below 1/4, nothing (so
+/// that the mean remains) from the Nyquist limit 1/2 on, smoothly faded between. 0 for what is not a number.
 pub fn clamped_spectrum(cycles_per_pixel: f64) -> f64 {
     let x = (4.0 * cycles_per_pixel.abs() - 1.0).clamp(0.0, 1.0);
     if x.is_nan() { 0.0 } else { 1.0 - x * x * (3.0 - 2.0 * x) }
@@ -29,9 +31,9 @@ pub fn clamped_spectrum(cycles_per_pixel: f64) -> f64 {
 /// Greatest number of strata along each side of [`supersample`].
 pub const MAX_STRATA: u32 = 64;
 
-/// The mean of a function over the ellipse of a footprint by n x n samples, n = `strata` (from 1 to [`MAX_STRATA`]): the
-/// last resort. The disc is cut into n rings of equal area, these into n sectors, with one sample at a place of its own in
-/// each. Values that are not finite count as zero.
+/// The mean of a function over the ellipse of a footprint by n x n samples, n = `strata` (from 1 to
+/// [`MAX_STRATA`]): the last resort. The disc is cut into n rings of equal area, these into n sectors, with
+/// one sample at a place of its own in each. Values that are not finite count as zero.
 pub fn supersample(function: impl Fn(DVec3) -> f64, at: &SpacePoint, strata: u32) -> f64 {
     let n = strata.clamp(1, MAX_STRATA);
     let mut sum = 0.0;
@@ -46,7 +48,8 @@ pub fn supersample(function: impl Fn(DVec3) -> f64, at: &SpacePoint, strata: u32
     sum / (f64::from(n) * f64::from(n))
 }
 
-/// Cubes (in the plane: squares) of side 1 in two values, band limited by the mean over the box around the footprint.
+/// Cubes (in the plane: squares) of side 1 in two values, band limited by the mean over the box around the
+/// footprint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checkerboard {
     /// The value where the sum of the coordinates' floors is even, and where it is odd.
@@ -66,7 +69,8 @@ impl TextureFunction for Checkerboard {
         self.filtered(&SpacePoint { point, ..SpacePoint::default() })
     }
 
-    /// Exact: the mean of a product of functions of one coordinate each over a box is the product of the means.
+    /// Exact: the mean of a product of functions of one coordinate each over a box is the product of the
+    /// means.
     fn filtered(&self, at: &SpacePoint) -> f64 {
         // The half sides of the ellipse's box, as of Footprint::half_box.
         let half = [0, 1, 2].map(|axis| libm::hypot(at.dx[axis], at.dy[axis]));
@@ -74,8 +78,8 @@ impl TextureFunction for Checkerboard {
     }
 }
 
-/// The mean of the square wave over [x - half, x + half]. Its integral is the triangle wave T, T(x) = 1 - |x mod 2 - 1|. 0, the
-/// mean of all, if an argument is not finite.
+/// The mean of the square wave over [x - half, x + half]. Its integral is the triangle wave T, T(x) = 1 - |x
+/// mod 2 - 1|. 0, the mean of all, if an argument is not finite.
 fn square_wave_mean(x: f64, half: f64) -> f64 {
     if !(x.is_finite() && half.is_finite()) {
         return 0.0;
@@ -93,10 +97,12 @@ fn square_wave_mean(x: f64, half: f64) -> f64 {
     (triangle(x + width) - triangle(x - width)) / (2.0 * half)
 }
 
-/// Octaves of gradient noise, each of a higher frequency and a lower amplitude: fractional Brownian motion. Mean 0.
+/// Octaves of gradient noise, each of a higher frequency and a lower amplitude: fractional Brownian motion.
+/// Mean 0.
 ///
-/// Band limited by clamping: octave i, taken for a wave of [`NOISE_CYCLES`] lacunarity^i cycles a unit, keeps the share
-/// [`clamped_spectrum`] of its cycles along the longer of dx and dy, since noise is alike in all directions.
+/// Band limited by clamping: octave i, taken for a wave of [`NOISE_CYCLES`] lacunarity^i cycles a unit, keeps
+/// the share [`clamped_spectrum`] of its cycles along the longer of dx and dy, since noise is alike in all
+/// directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fbm {
     /// Number of octaves, at most [`MAX_OCTAVES`] of which count.
@@ -109,8 +115,8 @@ pub struct Fbm {
     pub seed: u32,
 }
 
-/// Where the spectrum of [`gradient_noise`] is, in cycles a unit: its mean over a disc of radius 1/2, 3/4 and 1 keeps .67,
-/// .41 and .23 of it, and that of a wave of 1/2 cycle a unit .72, .40 and .18.
+/// Where the spectrum of [`gradient_noise`] is, in cycles a unit: its mean over a disc of radius 1/2, 3/4 and
+/// 1 keeps .67, .41 and .23 of it, and that of a wave of 1/2 cycle a unit .72, .40 and .18.
 pub const NOISE_CYCLES: f64 = 0.5;
 
 /// Greatest number of octaves.
@@ -137,11 +143,11 @@ impl TextureFunction for Fbm {
     }
 }
 
-/// The zone plate 1/2 + 1/2 cos(pi c (x^2 + y^2)), c = `cycles`: rings whose frequency grows with their radius, c r cycles a unit.
-/// The usual trial of band limiting: the alias of a ring is a ring.
+/// The zone plate 1/2 + 1/2 cos(pi c (x^2 + y^2)), c = `cycles`: rings whose frequency grows with their
+/// radius, c r cycles a unit. The usual trial of band limiting: the alias of a ring is a ring.
 ///
-/// Band limited by clamping, by the cycles that its phase advances to the next pixels in x and y, as the root of
-/// their squares' sum.
+/// Band limited by clamping, by the cycles that its phase advances to the next pixels in x and y, as the root
+/// of their squares' sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZonePlate {
     /// c, in cycles a squared unit.
@@ -155,7 +161,8 @@ impl TextureFunction for ZonePlate {
 
     fn filtered(&self, at: &SpacePoint) -> f64 {
         let point = at.point.truncate();
-        // To the next pixel the phase advances by c (p.d + d^2/2), to the one before by c (p.d - d^2/2): the greater.
+        // To the next pixel the phase advances by c (p.d + d^2/2), to the one before by c (p.d - d^2/2): the
+        // greater.
         let advance = |d: DVec2| self.cycles * (point.dot(d).abs() + 0.5 * d.length_squared());
         let share = clamped_spectrum(libm::hypot(advance(at.dx.truncate()), advance(at.dy.truncate())));
         let phase = 0.5 * self.cycles * point.length_squared();
@@ -164,8 +171,9 @@ impl TextureFunction for ZonePlate {
     }
 }
 
-/// Gradient noise (Perlin 2002): 0 at the points of the integer lattice, with one of 12 gradients there, chosen by a
-/// hash of the point; between them interpolated so that two derivatives are continuous. Mean 0, within +-1.04; 0 if not finite.
+/// Gradient noise (Perlin 2002): 0 at the points of the integer lattice, with one of 12 gradients there,
+/// chosen by a hash of the point; between them interpolated so that two derivatives are continuous. Mean 0,
+/// within +-1.04; 0 if not finite.
 pub fn gradient_noise(point: DVec3, seed: u32) -> f64 {
     if !point.is_finite() {
         return 0.0;

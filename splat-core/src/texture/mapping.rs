@@ -1,8 +1,9 @@
 //! From a point of a surface to texture coordinates, with their derivatives. Seed 3, section 11.2.
 //!
-//! The derivatives are analytic, and so have no seam: the seed's differences of coordinates, which jump there, are kept
-//! as [`difference_quotient`] to compare with. Angles are in turns (1 is 2 pi), as texture coordinates are.
-//! Whatever the arguments, nothing panics, and derivatives are finite (see [`PixelDerivatives::bounded`]).
+//! The derivatives are analytic, and so have no seam: the seed's differences of coordinates, which jump
+//! there, are kept as [`difference_quotient`] to compare with. Angles are in turns (1 is 2 pi), as texture
+//! coordinates are. Whatever the arguments, nothing panics, and derivatives are finite (see
+//! [`PixelDerivatives::bounded`]).
 
 use super::footprint::{Footprint, PixelDerivatives};
 use glam::{DAffine3, DVec2, DVec3};
@@ -27,7 +28,8 @@ pub struct SpacePoint {
 pub struct TexturePoint {
     /// (s, t), where 1 is the whole texture.
     pub st: DVec2,
-    /// The derivatives of (s, t). Their footprint: [`PixelDerivatives::semi_axes`] or [`PixelDerivatives::full_sides`].
+    /// The derivatives of (s, t). Their footprint: [`PixelDerivatives::semi_axes`] or
+    /// [`PixelDerivatives::full_sides`].
     pub derivatives: PixelDerivatives,
 }
 
@@ -56,13 +58,15 @@ impl UvMapping {
     }
 }
 
-/// A sphere around the origin of the texture's space, onto which points are projected from its centre (section 11.2.2).
+/// A sphere around the origin of the texture's space, onto which points are projected from its centre
+/// (section 11.2.2).
 ///
-/// s = theta/pi in [0, 1], 0 at the pole on +z; t = phi/(2 pi) in [0, 1], the turn from +x to +y. The seam t = 0 is on +x.
+/// s = theta/pi in [0, 1], 0 at the pole on +z; t = phi/(2 pi) in [0, 1], the turn from +x to +y. The seam t
+/// = 0 is on +x.
 ///
-/// The polar angle is atan2(hypot(x, y), z), since acos(z/r) knows angles near the poles only to 2e-4 in `f32`
-/// (erratum F7). At a pole, where t is undefined, it is the one of phi = 0, ds is the change of the distance to the pole, and
-/// dt that of a full turn; nowhere is dt more. At the centre all is zero.
+/// The polar angle is atan2(hypot(x, y), z), since acos(z/r) knows angles near the poles only to 2e-4 in
+/// `f32` (erratum F7). At a pole, where t is undefined, it is the one of phi = 0, ds is the change of the
+/// distance to the pole, and dt that of a full turn; nowhere is dt more. At the centre all is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SphericalMapping {
     /// To the texture's space.
@@ -84,8 +88,8 @@ impl SphericalMapping {
 /// What the height on a cylinder is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CylinderHeight {
-    /// z/|p| in [-1, 1], as the seed prints it (and pbrt up to v3): the point is normalised first, so that the lines of
-    /// equal t are those of a sphere.
+    /// z/|p| in [-1, 1], as the seed prints it (and pbrt up to v3): the point is normalised first, so that
+    /// the lines of equal t are those of a sphere.
     #[default]
     Normalized,
     /// z, in units of the texture's space: projected onto the cylinder at right angles to its axis (pbrt-v4).
@@ -94,9 +98,9 @@ pub enum CylinderHeight {
 
 /// A cylinder around the z axis of the texture's space (section 11.2.3).
 ///
-/// s = 1/2 + phi/(2 pi) in [0, 1], with the seam on -x (there it is s that jumps, though pbrt up to v3 corrects t: erratum
-/// F5); t by [`CylinderHeight`]. On the axis, where s is undefined, it is 1/2, and ds that of a full turn; nowhere is ds more.
-/// At the centre, if t is normalised, all is zero.
+/// s = 1/2 + phi/(2 pi) in [0, 1], with the seam on -x (there it is s that jumps, though pbrt up to v3
+/// corrects t: erratum F5); t by [`CylinderHeight`]. On the axis, where s is undefined, it is 1/2, and ds
+/// that of a full turn; nowhere is ds more. At the centre all is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CylindricalMapping {
     /// To the texture's space.
@@ -149,7 +153,8 @@ impl PlanarMapping {
     }
 }
 
-/// Space itself, moved into the texture's: for textures that are functions of three coordinates (`TextureMapping3D`).
+/// Space itself, moved into the texture's: for textures that are functions of three coordinates
+/// (`TextureMapping3D`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolidMapping {
     /// To the texture's space.
@@ -171,12 +176,13 @@ impl SolidMapping {
     }
 }
 
-/// The derivative of texture coordinates along `change` by a forward difference over `delta` of it, as the seed has it for
-/// spheres and cylinders, corrected: the coordinates that wrap around (period 1) jump at the seam, and lose their whole turns
-/// *before* the division by `delta`.
+/// The derivative of texture coordinates along `change` by a forward difference over `delta` of it, as the
+/// seed has it for spheres and cylinders, corrected: the coordinates that wrap around (period 1) jump at the
+/// seam, and lose their whole turns *before* the division by `delta`.
 ///
-/// As printed, 1 - d or -(d + 1) replaces a *quotient* d beyond +-1/2: too late, and of the wrong sign (erratum F4: -8.98 for
-/// -0.0159). Correct as long as the coordinates change by less than half a turn over the difference. For tests.
+/// As printed, 1 - d or -(d + 1) replaces a *quotient* d beyond +-1/2: too late, and of the wrong sign
+/// (erratum F4: -8.98 for -0.0159). Correct as long as the coordinates change by less than half a turn over
+/// the difference. For tests.
 pub fn difference_quotient(
     map: impl Fn(DVec3) -> DVec2,
     point: DVec3,
@@ -189,8 +195,8 @@ pub fn difference_quotient(
     (difference - turns) / delta
 }
 
-/// A point and its derivatives in the texture's space, divided by `scale`, a power of 2, so that nothing overflows
-/// and no digit is lost.
+/// A point and its derivatives in the texture's space, divided by `scale`, a power of 2, so that nothing
+/// overflows and no digit is lost.
 struct Local {
     scale: f64,
     point: DVec3,
@@ -215,8 +221,11 @@ impl Local {
         libm::hypot(self.point.x, self.point.y)
     }
 
-    /// The turn from +x to +y, in [-1/2, 1/2].
+    /// The turn from +x to +y, in [-1/2, 1/2]; 0 on the axis, also for negative zeros.
     fn signed_turn(&self) -> f64 {
+        if self.axis_distance() == 0.0 {
+            return 0.0;
+        }
         libm::atan2(self.point.y, self.point.x) / TAU
     }
 
