@@ -305,6 +305,11 @@ fn f09_the_fallback_is_bounded_and_along_what_is_there() {
     assert_eq!(printed::solve([[0.2, 0.1], [0.4, 0.2]], [offset.x, offset.y]), [1.0, 0.0]);
     let found = surface(2.0 * dpdv, dpdv).parameters_of(offset);
     assert!((found - DVec2::new(0.02, 0.01)).length() <= tol::EXACT, "{found}");
+    // So near to it that f32 cannot tell: not 1e9 times as much.
+    let nearly = surface(2.0 * dpdv, dpdv + DVec3::new(2e-10, -1e-10, 0.0));
+    let across = offset + DVec3::new(0.02, -0.01, 0.0);
+    let found = nearly.parameters_of(across);
+    assert!((found - DVec2::new(0.02, 0.01)).length() <= 1e-9, "{found}");
     // As at the pole of a sphere.
     let found = surface(DVec3::ZERO, dpdv).parameters_of(offset);
     assert!((found - DVec2::new(0.0, 0.05)).length() <= tol::EXACT, "{found}");

@@ -91,10 +91,8 @@ fn square_wave_mean(x: f64, half: f64) -> f64 {
         let share = if half > clear { clear / half } else { 1.0 };
         return if x < 1.0 { share } else { -share };
     }
-    // Whole periods add nothing to the integral.
-    let width = half - 2.0 * (0.5 * half).floor();
     let triangle = |x: f64| 1.0 - (x - 2.0 * (0.5 * x).floor() - 1.0).abs();
-    (triangle(x + width) - triangle(x - width)) / (2.0 * half)
+    (triangle(x + half) - triangle(x - half)) / (2.0 * half)
 }
 
 /// Octaves of gradient noise, each of a higher frequency and a lower amplitude: fractional Brownian motion.
