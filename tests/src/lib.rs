@@ -6,8 +6,10 @@
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
 //! - [`core_scenes`]: scenes of `splat-core`, and the same for the brute-force truth;
 //! - [`errata_scenes`]: scenes that show the errata, and the corrected closed forms;
+//! - [`printed_textures`]: footprints, differentials and mappings as printed, faults included;
 //! - [`random`]: deterministic random numbers for scenes;
 //! - [`scenes`]: small scenes made in code;
+//! - [`textures`]: what the tests of footprints, differentials and mappings share;
 //! - [`tolerances`]: every tolerance with its derivation.
 
 pub mod analytic;
@@ -16,6 +18,8 @@ pub mod core_scenes;
 pub mod errata_scenes;
 pub mod hard_scenes;
 pub mod listing;
+pub mod printed_textures;
 pub mod random;
 pub mod scenes;
+pub mod textures;
 pub mod tolerances;

@@ -10,4 +10,10 @@ pub mod function;
 pub mod mapping;
 pub mod pyramid;
 
-pub use footprint::{Footprint, FullSides};
+pub use differentials::{Ray, RayDifferential, Surface, SurfaceDifferentials};
+pub use footprint::{Footprint, FullSides, PixelDerivatives, PrincipalAxes};
+pub use function::{Checkerboard, Fbm, TextureFunction, ZonePlate};
+pub use mapping::{
+    CylinderHeight, CylindricalMapping, PlanarMapping, SolidMapping, SpacePoint, SphericalMapping,
+    TexturePoint, UvMapping,
+};
