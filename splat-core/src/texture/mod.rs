@@ -11,3 +11,4 @@ pub mod mapping;
 pub mod pyramid;
 
 pub use footprint::{Footprint, FullSides};
+pub use pyramid::{Pyramid, PyramidError, Texels, Wrap};

@@ -1,0 +1,85 @@
+//! How texels are stored.
+
+use crate::srgb;
+use half::f16;
+
+/// The values of an image, channels interleaved, in one of the stored forms.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Texels {
+    /// Linear values.
+    F32(Vec<f32>),
+    /// Linear values, rounded to 11 bits: half the memory, and faster where memory is what a lookup waits for.
+    F16(Vec<f16>),
+    /// sRGB codes, linearised when read. Coarser levels are rounded to the nearest code: half a code of error.
+    Srgb8(Vec<u8>),
+}
+
+impl Texels {
+    /// Linear values as [`Texels::F16`]. What is too large for 16 bits becomes the largest that is not.
+    pub fn f16_from(values: &[f32]) -> Self {
+        Self::F16(values.iter().map(|&value| to_f16(value)).collect())
+    }
+
+    /// The number of values.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::F16(values) => values.len(),
+            Self::Srgb8(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The linear texel whose first value is at `start`; `linear`: the values of the sRGB codes.
+    #[inline]
+    pub(super) fn texel(&self, start: usize, channels: usize, linear: &[f32]) -> [f32; 4] {
+        let mut texel = [0.0; 4];
+        match self {
+            Self::F32(values) => {
+                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
+                    *out = value;
+                }
+            }
+            Self::F16(values) => {
+                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
+                    *out = value.to_f32();
+                }
+            }
+            Self::Srgb8(values) => {
+                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
+                    *out = linear[usize::from(value)];
+                }
+                if channels.is_multiple_of(2) {
+                    texel[channels - 1] = f32::from(values[start + channels - 1]) / 255.0;
+                }
+            }
+        }
+        texel
+    }
+
+    /// Linear values in the same form as `self`.
+    pub(super) fn same_form(&self, values: &[f32], channels: usize) -> Self {
+        match self {
+            Self::F32(_) => Self::F32(values.to_vec()),
+            Self::F16(_) => Self::f16_from(values),
+            Self::Srgb8(_) => {
+                let code = |(i, &value): (usize, &f32)| {
+                    let is_alpha = channels.is_multiple_of(2) && i % channels == channels - 1;
+                    let value = f64::from(value);
+                    (255.0 * if is_alpha { value } else { srgb::encode(value) }).round() as u8
+                };
+                Self::Srgb8(values.iter().enumerate().map(code).collect())
+            }
+        }
+    }
+}
+
+/// The nearest f16; infinities and beyond become the largest finite ones.
+fn to_f16(value: f32) -> f16 {
+    let rounded = f16::from_f32(value);
+    if rounded.is_infinite() && value.is_finite() { f16::MAX.copysign(rounded) } else { rounded }
+}
