@@ -8,6 +8,7 @@
 //! - [`errata_scenes`]: scenes that show the errata, and the corrected closed forms;
 //! - [`random`]: deterministic random numbers for scenes;
 //! - [`scenes`]: small scenes made in code;
+//! - [`texture_truth`]: the integral that texture filters approximate, and images for it;
 //! - [`tolerances`]: every tolerance with its derivation.
 
 pub mod analytic;
@@ -18,4 +19,5 @@ pub mod hard_scenes;
 pub mod listing;
 pub mod random;
 pub mod scenes;
+pub mod texture_truth;
 pub mod tolerances;

@@ -10,5 +10,6 @@ pub mod function;
 pub mod mapping;
 pub mod pyramid;
 
+pub use filter::{Filter, Magnification, Probes, Quality, Sampler, SummedArea};
 pub use footprint::{Footprint, FullSides};
 pub use pyramid::{Pyramid, PyramidError, Texels, Wrap};
