@@ -56,7 +56,7 @@ impl Ellipse {
         let axis = if half >= 0.0 { DVec2::new(half + root, xy) } else { DVec2::new(xy, root - half) };
         let direction = axis.try_normalize().unwrap_or(DVec2::X);
 
-        let anisotropy = max_anisotropy.max(1.0).min(MAX_ANISOTROPY);
+        let anisotropy = honoured_anisotropy(max_anisotropy);
         let minor_squared = minor_squared.max(major_squared / (anisotropy * anisotropy)).min(major_squared);
         let DVec2 { x, y } = direction;
         let matrix = [
@@ -66,6 +66,11 @@ impl Ellipse {
         ];
         Self { matrix, major: major_squared.sqrt(), minor: minor_squared.sqrt(), direction }
     }
+}
+
+/// The nearest anisotropy that lookups honour: 1 to [`MAX_ANISOTROPY`], and 1 for what is not a number.
+pub fn honoured_anisotropy(max_anisotropy: f64) -> f64 {
+    if max_anisotropy.is_nan() { 1.0 } else { max_anisotropy.clamp(1.0, MAX_ANISOTROPY) }
 }
 
 /// A vector without NaN and infinities.

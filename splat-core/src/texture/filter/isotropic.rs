@@ -62,8 +62,7 @@ impl BetweenLevels {
     /// Where texels are `width` texels of level 0 large, on a logarithmic scale as pbrt's. Clamped to the
     /// levels that there are (E7), in texels of each axis (E2).
     pub fn of_width(pyramid: &Pyramid, width: f64) -> Self {
-        let log = |level: &Level| libm::log2(level.coarseness());
-        Self::of(pyramid, libm::log2(width.max(1.0)), log)
+        Self::of(pyramid, width, Level::coarseness, |below, above| libm::log2(above / below))
     }
 
     /// Where bilinear interpolation of the level's texels has this variance, in squared texels of level 0.
@@ -75,16 +74,23 @@ impl BetweenLevels {
             };
             axis(0).max(axis(1))
         };
-        Self::of(pyramid, variance, of_level)
+        Self::of(pyramid, variance, of_level, |below, above| above - below)
     }
 
-    fn of(pyramid: &Pyramid, value: f64, measure: impl Fn(&Level) -> f64) -> Self {
+    /// Between the levels whose measures enclose `value`, by the distances of measures.
+    fn of(
+        pyramid: &Pyramid,
+        value: f64,
+        measure: impl Fn(&Level) -> f64,
+        distance: impl Fn(f64, f64) -> f64,
+    ) -> Self {
         let levels = pyramid.levels();
         let finer = levels.partition_point(|level| measure(level) <= value).saturating_sub(1);
-        let share = levels.get(finer + 1).map_or(0.0, |coarser| {
-            let (low, high) = (measure(&levels[finer]), measure(coarser));
-            ((value - low) / (high - low)).clamp(0.0, 1.0)
-        });
+        let low = measure(&levels[finer]);
+        let share = levels
+            .get(finer + 1)
+            .filter(|_| value > low)
+            .map_or(0.0, |coarser| (distance(low, value) / distance(low, measure(coarser))).clamp(0.0, 1.0));
         Self { finer, share }
     }
 

@@ -12,7 +12,7 @@ mod rows;
 mod summed_area;
 
 pub use assembly::{ProbeRow, Probes, SIDE_PER_SEMI_AXIS};
-pub use ellipse::{Ellipse, MAX_ANISOTROPY, MAX_PERIODS, Symmetric, place};
+pub use ellipse::{Ellipse, MAX_ANISOTROPY, MAX_PERIODS, Symmetric, honoured_anisotropy, place};
 pub use mean::Average;
 pub use rows::{BILINEAR_VARIANCE, KERNEL_VARIANCE, RowKernel, RowSpan, WEIGHT_POLYNOMIAL, weight};
 pub use summed_area::SummedArea;
@@ -53,7 +53,7 @@ impl Quality {
 
     /// A number of texels, clamped to 1.25 (below, few texels make a kernel) to 8; not a number: 1.25.
     pub fn new(texels: f64) -> Self {
-        Self(texels.max(1.25).min(8.0))
+        Self(if texels.is_nan() { 1.25 } else { texels.clamp(1.25, 8.0) })
     }
 
     /// The number of texels.
@@ -120,7 +120,7 @@ impl Sampler {
         let footprint = Footprint { semi_axes: footprint.semi_axes.map(|axis| axis * self.width as f32) };
         let place = place(pyramid.wrap(), st);
         if self.filter == Filter::EwaPrinted {
-            let anisotropy = self.max_anisotropy.max(1.0).min(MAX_ANISOTROPY) as f32;
+            let anisotropy = honoured_anisotropy(self.max_anisotropy) as f32;
             return ewa_printed::lookup(pyramid, place, &footprint, anisotropy).rounded();
         }
         let ellipse = Ellipse::new(&footprint, pyramid.levels()[0].size(), self.max_anisotropy);

@@ -37,28 +37,18 @@ impl Texels {
     /// The linear texel whose first value is at `start`; `linear`: the values of the sRGB codes.
     #[inline]
     pub(super) fn texel(&self, start: usize, channels: usize, linear: &[f32]) -> [f32; 4] {
-        let mut texel = [0.0; 4];
+        let range = start..start + channels;
         match self {
-            Self::F32(values) => {
-                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
-                    *out = value;
-                }
-            }
-            Self::F16(values) => {
-                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
-                    *out = value.to_f32();
-                }
-            }
+            Self::F32(values) => padded(&values[range], |value| value),
+            Self::F16(values) => padded(&values[range], f16::to_f32),
             Self::Srgb8(values) => {
-                for (out, &value) in texel.iter_mut().zip(&values[start..start + channels]) {
-                    *out = linear[usize::from(value)];
-                }
+                let mut texel = padded(&values[range], |code| linear[usize::from(code)]);
                 if channels.is_multiple_of(2) {
                     texel[channels - 1] = f32::from(values[start + channels - 1]) / 255.0;
                 }
+                texel
             }
         }
-        texel
     }
 
     /// Linear values in the same form as `self`.
@@ -75,6 +65,18 @@ impl Texels {
                 Self::Srgb8(values.iter().enumerate().map(code).collect())
             }
         }
+    }
+}
+
+/// One to four values and zeros.
+#[inline]
+fn padded<T: Copy>(values: &[T], to_f32: impl Fn(T) -> f32) -> [f32; 4] {
+    match *values {
+        [a] => [to_f32(a), 0.0, 0.0, 0.0],
+        [a, b] => [to_f32(a), to_f32(b), 0.0, 0.0],
+        [a, b, c] => [to_f32(a), to_f32(b), to_f32(c), 0.0],
+        [a, b, c, d] => [to_f32(a), to_f32(b), to_f32(c), to_f32(d)],
+        _ => [0.0; 4],
     }
 }
 
