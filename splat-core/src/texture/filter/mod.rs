@@ -88,11 +88,11 @@ pub struct Sampler {
     pub filter: Filter,
     /// The filter of smaller ones. [`Filter::EwaPrinted`] knows of none.
     pub magnification: Magnification,
-    /// How many times as long as wide a footprint may be; longer ones are widened. It bounds the time of every
-    /// lookup, whatever the footprint: some `pi Q^2` times as many texels, times 4 at most. Clamped to 1 to
-    /// [`MAX_ANISOTROPY`].
+    /// A: how many times as long as wide a footprint may be; longer ones are widened. Clamped to 1 to
+    /// [`MAX_ANISOTROPY`]. It bounds the time of every lookup, whatever the footprint: variance-compensated EWA of quality Q reads
+    /// some `4 pi Q^2 A` texels at most (twice as many where sizes are no powers of two), probes `8 (2 A + 1)`.
     pub max_anisotropy: f64,
-    /// Factor on all footprints: below 1 for sharper, above 1 for smoother textures.
+    /// Factor on all footprints: below 1 for sharper, above 1 for smoother textures. Not a number: 0.
     pub width: f64,
 }
 

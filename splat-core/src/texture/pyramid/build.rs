@@ -5,33 +5,21 @@ use half::f16;
 
 /// All levels of an image, from the given one to that of a single texel. `linear`: the values of the sRGB codes.
 pub(super) fn levels(size: [u32; 2], channels: usize, texels: Texels, linear: &[f32]) -> Vec<Level> {
-    let decoded = Image {
-        size,
-        channels,
-        values: {
-            let texel = |start| texels.texel(start, channels, linear);
-            (0..texels.len())
-                .step_by(channels)
-                .flat_map(|start| texel(start).into_iter().take(channels))
-                .collect()
-        },
-    };
-    let mut images = vec![decoded];
+    let mut images = vec![Image { size, channels, texels }];
     while images[images.len() - 1].size != [1, 1] {
         let size = images[images.len() - 1].size.map(|count| count.div_ceil(2));
         // The mean of level 0 over a rectangle is the mean of a coarser level over it, if its texels tile the rectangle.
         let tiles = |image: &&Image| (0..2).all(|axis| image.size[axis].is_multiple_of(size[axis]));
         let source = images.iter().rev().find(tiles).unwrap_or(&images[0]);
-        let image = source.reduced(size);
+        let image = source.reduced(size, linear);
         images.push(image);
     }
-    let coarser: Vec<Level> = images[1..]
-        .iter()
-        .map(|image| level(size, image.size, texels.same_form(&image.values, channels)))
-        .collect();
-    let mut levels = vec![level(size, size, texels)];
-    levels.extend(coarser);
-    levels
+    // Rounded only now: coarser levels are not made of rounded ones.
+    let (finest, coarser) = images.split_at_mut(1);
+    for image in coarser {
+        image.texels.convert_like(&finest[0].texels, channels);
+    }
+    images.into_iter().map(|image| level(size, image.size, image.texels)).collect()
 }
 
 fn level(finest: [u32; 2], size: [u32; 2], texels: Texels) -> Level {
@@ -40,26 +28,28 @@ fn level(finest: [u32; 2], size: [u32; 2], texels: Texels) -> Level {
     Level { size, texel_size, variance, texels }
 }
 
-/// Linear values while levels are built.
+/// A level while levels are built; all but the finest are `f32`.
 struct Image {
     size: [u32; 2],
     channels: usize,
-    values: Vec<f32>,
+    texels: Texels,
 }
 
 impl Image {
     /// The exact means over `size` equal rectangles; at most as many per axis as there are texels.
-    fn reduced(&self, size: [u32; 2]) -> Self {
+    fn reduced(&self, size: [u32; 2], linear: &[f32]) -> Self {
         let columns = overlaps(self.size[0], size[0]);
         let rows = overlaps(self.size[1], size[1]);
         let row_length = size[0] as usize * self.channels;
         let mut sums = vec![0.0_f64; row_length * (size[1] as usize + 1)];
         let mut row_sums = vec![0.0_f64; row_length + self.channels];
-        for (source, to_row) in self.values.chunks_exact(self.size[0] as usize * self.channels).zip(&rows) {
+        for (y, to_row) in rows.iter().enumerate() {
             row_sums.fill(0.0);
-            for (texel, to) in source.chunks_exact(self.channels).zip(&columns) {
+            for (x, to) in columns.iter().enumerate() {
+                let source = (y * columns.len() + x) * self.channels;
+                let texel = self.texels.texel(source, self.channels, linear);
                 let start = to.first * self.channels;
-                for (channel, &value) in texel.iter().enumerate() {
+                for (channel, &value) in texel.iter().enumerate().take(self.channels) {
                     row_sums[start + channel] += to.shares[0] * f64::from(value);
                     row_sums[start + self.channels + channel] += to.shares[1] * f64::from(value);
                 }
@@ -74,7 +64,7 @@ impl Image {
         let area = f64::from(self.size[0]) * f64::from(self.size[1]);
         let mean = |sum: &f64| (sum / area) as f32;
         let values = sums[..row_length * size[1] as usize].iter().map(mean).collect();
-        Self { size, channels: self.channels, values }
+        Self { size, channels: self.channels, texels: Texels::F32(values) }
     }
 }
 

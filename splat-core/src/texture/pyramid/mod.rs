@@ -13,6 +13,7 @@ mod build;
 mod texels;
 
 use crate::srgb;
+pub use half::f16;
 pub use texels::Texels;
 
 /// What lies beyond the edge of a texture, along one axis.

@@ -51,18 +51,19 @@ impl Texels {
         }
     }
 
-    /// Linear values in the same form as `self`.
-    pub(super) fn same_form(&self, values: &[f32], channels: usize) -> Self {
-        match self {
-            Self::F32(_) => Self::F32(values.to_vec()),
-            Self::F16(_) => Self::f16_from(values),
+    /// Brings linear `f32` values to the form of `other`; other values stay.
+    pub(super) fn convert_like(&mut self, other: &Self, channels: usize) {
+        let Self::F32(values) = &*self else { return };
+        match other {
+            Self::F32(_) => {}
+            Self::F16(_) => *self = Self::f16_from(values),
             Self::Srgb8(_) => {
                 let code = |(i, &value): (usize, &f32)| {
                     let is_alpha = channels.is_multiple_of(2) && i % channels == channels - 1;
                     let value = f64::from(value);
                     (255.0 * if is_alpha { value } else { srgb::encode(value) }).round() as u8
                 };
-                Self::Srgb8(values.iter().enumerate().map(code).collect())
+                *self = Self::Srgb8(values.iter().enumerate().map(code).collect());
             }
         }
     }
