@@ -58,7 +58,7 @@ impl Image {
     pub fn truth(&self, lookup: &Lookup) -> [f64; 4] {
         let size = DVec2::new(f64::from(self.size[0]), f64::from(self.size[1]));
         let axis = DVec2::new(libm::cos(lookup.angle), libm::sin(lookup.angle));
-        // At least 64 points across (3217 in the disc, and 4096 where it is long), and three a texel.
+        // At least 73 points across, 4185 in the disc, and three a texel.
         let points = |semi_axis: f64| (6.0 * semi_axis).ceil().max(73.0) as u32;
         let (columns, rows) = (points(lookup.major), points(lookup.minor));
         let (mut sum, mut total) = ([0.0; 4], 0.0);

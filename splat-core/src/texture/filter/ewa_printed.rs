@@ -3,8 +3,9 @@
 //! In `f32`, its statements in their order; they say where they depart:
 //! - the pyramid is ours: of any size (E13), and box-filtered from existing texels only (E11);
 //! - hostile input (E10) is made harmless: the vectors' components lie within [`MAX_PERIODS`] and are 0 below 1e-18, whose
-//!   squares `f32` does not have; the box of texels is at most `3 maxAnisotropy + 8` from its centre in each axis, which it only exceeds
-//!   where the determinant has cancelled; and a lookup without weights becomes bilinear.
+//!   squares `f32` does not have, and a lookup without weights becomes bilinear. That is enough for an end and a bound: the second
+//!   vector has less than 2 texels at the chosen level, so the first has less than `2 maxAnisotropy`, with which the determinant
+//!   does not cancel (E3) for anisotropies up to [`MAX_ANISOTROPY`](super::MAX_ANISOTROPY).
 
 use super::ellipse::MAX_PERIODS;
 use super::isotropic::bilinear;
@@ -51,12 +52,12 @@ pub(super) fn lookup(pyramid: &Pyramid, place: DVec2, footprint: &Footprint, max
     let lod = (levels as f32 - 1.0 + libm::log2f(minor_length)).max(0.0);
     let ilod = lod.floor() as usize;
     let d = lod - lod.floor();
-    let filter = |level| ewa(pyramid, level, place, d0, d1, max_anisotropy);
+    let filter = |level| ewa(pyramid, level, place, d0, d1);
     filter(ilod).mix(filter(ilod + 1), f64::from(d))
 }
 
 /// `MIPMap::EWA`.
-fn ewa(pyramid: &Pyramid, level: usize, place: DVec2, d0: Vec2, d1: Vec2, max_anisotropy: f32) -> Mean {
+fn ewa(pyramid: &Pyramid, level: usize, place: DVec2, d0: Vec2, d1: Vec2) -> Mean {
     if level >= pyramid.levels().len() {
         return Mean { color: pyramid.texel(pyramid.last(), 0, 0).map(f64::from), texels: 1 };
     }
@@ -77,8 +78,7 @@ fn ewa(pyramid: &Pyramid, level: usize, place: DVec2, d0: Vec2, d1: Vec2, max_an
     // Compute the ellipse's (s,t) bounding box in texture space
     let det = -b * b + 4.0 * a * c;
     let inv_det = 1.0 / det;
-    let [u, v] = [(det * c).sqrt(), (a * det).sqrt()]
-        .map(|root| (2.0 * inv_det * root).min(3.0 * max_anisotropy + 8.0).max(0.0));
+    let (u, v) = (2.0 * inv_det * (det * c).sqrt(), 2.0 * inv_det * (a * det).sqrt());
     let (s0, s1) = ((s - u).ceil() as i64, (s + u).floor() as i64);
     let (t0, t1) = ((t - v).ceil() as i64, (t + v).floor() as i64);
 
