@@ -30,8 +30,8 @@ impl Image {
         Self::from_fn([size; 2], |x, y| ((x / square + y / square) % 2) as f32)
     }
 
-    /// Rings `(1 + cos(pi r^2 / size)) / 2` around the middle: at r texels from there, r / size rings a texel, up to one in
-    /// two texels at the middle of the edges.
+    /// Rings `(1 + cos(pi r^2 / size)) / 2` around the middle: at r texels from there, r / size rings a texel, up to
+    /// one in two texels at the middle of the edges.
     pub fn zone_plate(size: u32) -> Self {
         let ring = |x: u32, y: u32| {
             let offset = DVec2::new(f64::from(x), f64::from(y)) + 0.5 - 0.5 * f64::from(size);

@@ -1,5 +1,5 @@
-//! The errata E1 to E14 of pbrt's EWA (seed 1) and those of Footprint Assembly (seed 2): the printed form goes wrong by the
-//! number that the specification's table gives, ours does not.
+//! The errata E1 to E14 of pbrt's EWA (seed 1) and those of Footprint Assembly (seed 2): the printed form goes wrong
+//! by the number that the specification's table gives, ours does not.
 //!
 //! E11 is also tested where levels are built, in `splat-core`.
 
@@ -88,7 +88,8 @@ fn e01_the_longer_vector_is_no_axis() {
 
 #[test]
 fn e02_a_wide_texture_has_two_units() {
-    // 16 texels along s and 1 along t of 1024 x 64: printed, the level is 10 + log2(1/64) = 4. Stripes of two rows are grey there.
+    // 16 texels along s and 1 along t of 1024 x 64: printed, the level is 10 + log2(1/64) = 4. Stripes of two rows
+    // are grey there.
     let image = Image::from_fn([1024, 64], |_, y| (y / 2 % 2) as f32);
     let footprint = footprint([1.0 / 64.0, 0.0], [0.0, 1.0 / 64.0]);
     assert_eq!(10.0 + libm::log2(1.0 / 64.0), 4.0);
@@ -415,6 +416,14 @@ fn summed_areas_are_exact_for_any_corners_and_wraps() {
             assert!((found - truth).abs() < 1e-7, "{wrap:?} {center} {sides}: {found} {truth}");
         }
     }
+}
+
+#[test]
+fn summed_areas_of_thin_rectangles_stay_thin() {
+    let wide = Image::noise([2048, 8], 1, 71).pyramid(Wrap::Clamp);
+    let found = SummedArea::new(&wide).rectangle(Vec2::splat(0.5), Vec2::new(1.0, 0.125)).color[0];
+    let truth = rectangle_mean(&wide, DVec2::new(0.0, 3.5), DVec2::new(2048.0, 1.0));
+    assert!((f64::from(found) - truth).abs() < 1e-7, "{found} {truth}");
 }
 
 #[test]

@@ -251,7 +251,8 @@ fn no_jump_at_a_level_switch() {
     }
 }
 
-/// From a point to several texels, nothing jumps but at a switch of levels, and where the row of probes becomes longer by one.
+/// From a point to several texels, nothing jumps but at a switch of levels, and where the row of probes becomes
+/// longer by one.
 #[test]
 fn magnification_fades_in() {
     let image = Image::noise([32, 32], 1, 4);
@@ -273,12 +274,13 @@ fn magnification_fades_in() {
 
 /// The most texels that a lookup may read, whatever the footprint, for an anisotropy A.
 ///
-/// Of variance-compensated EWA: unless it is the last, a level has texels of t with minor < 2 Q t, so the ellipse there has the semi-axes
-/// a = sqrt((2 Q A)^2 + 1.23) and b = sqrt((2 Q)^2 + 1.23) texels at most (1.23: 1/6 over the kernel's variance), texels being
-/// t in both axes. They may be half of that in one axis (sizes are rounded up), where area and extent double. A convex set of
-/// area F and perimeter P has at most F + P/2 + 1 lattice points (Nosarzewska 1948), and here P/2 <= 8 a. A level of
-/// one texel in one axis has 9 rows or columns at most, of 2 a + 1 texels, fewer than that; the last one 9 x 9 texels.
-/// Of EWA: the same with Q = 1 and 1/2, at two levels (where 1 stands for 1.23). Of probes: 8 texels each.
+/// Of variance-compensated EWA: unless it is the last, a level has texels of t with minor < 2 Q t, so the ellipse
+/// there has the semi-axes a = sqrt((2 Q A)^2 + 1.23) and b = sqrt((2 Q)^2 + 1.23) texels at most (1.23: 1/6 over the
+/// kernel's variance), texels being t in both axes. They may be half of that in one axis (sizes are rounded up),
+/// where area and extent double. A convex set of area F and perimeter P has at most F + P/2 + 1 lattice points
+/// (Nosarzewska 1948), and here P/2 <= 8 a. A level of one texel in one axis has 9 rows or columns at most, of 2 a +
+/// 1 texels, fewer than that; the last one 9 x 9 texels. Of EWA: the same with Q = 1 and 1/2, at two levels (where 1
+/// stands for 1.23). Of probes: 8 texels each.
 fn most_texels(filter: Filter, anisotropy: f64) -> f64 {
     let rows = |quality: f64| {
         let a = ((2.0 * quality * anisotropy).powi(2) + 1.23).sqrt();

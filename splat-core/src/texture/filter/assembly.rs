@@ -13,14 +13,15 @@ use glam::DVec2;
 /// How many lookups a footprint takes, and what they weigh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Probes {
-    /// Texram (Schilling, Knittel and Strasser 1996): with r1, r2 the full sides along the axes, `N = 2^round(log2(|r1| / |r2|))` at
-    /// `p_n = p + (n / 2) (r1 / N)`, n = +-1, +-3 .. +-(N - 1) (N = 1: at p), all of one weight. They stand .71 to
-    /// 1.41 |r2| apart: gaps alias.
+    /// Texram (Schilling, Knittel and Strasser 1996): with r1, r2 the full sides along the axes, `N =
+    /// 2^round(log2(|r1| / |r2|))` at `p_n = p + (n / 2) (r1 / N)`, n = +-1, +-3 .. +-(N - 1) (N = 1: at p), all of
+    /// one weight. They stand .71 to 1.41 |r2| apart: gaps alias.
     Texram,
     /// The same with N rounded up to a power of two: .5 to 1 |r2| apart.
     TexramCeiling,
-    /// As many as it takes, at most a minor semi-axis apart, with the weights `exp(-2 x^2) - exp(-2)` along the axis, x in
-    /// (-1, 1), and spaced so that the whole has the variance of the ellipse's kernel (as Feline, McCormack et al. 1999).
+    /// As many as it takes, at most a minor semi-axis apart, with the weights `exp(-2 x^2) - exp(-2)` along the axis,
+    /// x in (-1, 1), and spaced so that the whole has the variance of the ellipse's kernel (as Feline, McCormack et
+    /// al. 1999).
     #[default]
     Gaussian,
 }

@@ -2,10 +2,11 @@
 //!
 //! In `f32`, its statements in their order; they say where they depart:
 //! - the pyramid is ours: of any size (E13), and box-filtered from existing texels only (E11);
-//! - hostile input (E10) is made harmless: the vectors' components lie within [`MAX_PERIODS`] and are 0 below 1e-18, whose
-//!   squares `f32` does not have, and a lookup without weights becomes bilinear. That is enough for an end and a bound: the second
-//!   vector has less than 2 texels at the chosen level, so the first has less than `2 maxAnisotropy`, with which the determinant
-//!   does not cancel (E3) for anisotropies up to [`MAX_ANISOTROPY`](super::MAX_ANISOTROPY).
+//! - hostile input (E10) is made harmless: the vectors' components lie within [`MAX_PERIODS`] and are 0 below 1e-18,
+//!   whose squares `f32` does not have, and a lookup without weights becomes bilinear. That is enough for an end and
+//!   a bound: the second vector has less than 2 texels at the chosen level, so the first has less than `2
+//!   maxAnisotropy`, with which the determinant does not cancel (E3) for anisotropies up to
+//!   [`MAX_ANISOTROPY`](super::MAX_ANISOTROPY).
 
 use super::ellipse::MAX_PERIODS;
 use super::isotropic::bilinear;

@@ -1,7 +1,8 @@
 //! Averages of a pyramid over a footprint. Seeds 1 and 2, with the errata E1 to E14 of docs/specification.md.
 //!
-//! [`Sampler::lookup`] is the scalar reference. A lookup has a set-up of its own, in `f64`, that other cores share: [`Ellipse`]
-//! (the sanitised footprint in texels), then [`RowKernel`] (an ellipse at one level, summed row by row) or [`ProbeRow`].
+//! [`Sampler::lookup`] is the scalar reference. A lookup has a set-up of its own, in `f64`, that other cores share:
+//! [`Ellipse`] (the sanitised footprint in texels), then [`RowKernel`] (an ellipse at one level, summed row by row)
+//! or [`ProbeRow`].
 
 mod assembly;
 mod ellipse;
@@ -89,8 +90,9 @@ pub struct Sampler {
     /// The filter of smaller ones. [`Filter::EwaPrinted`] knows of none.
     pub magnification: Magnification,
     /// A: how many times as long as wide a footprint may be; longer ones are widened. Clamped to 1 to
-    /// [`MAX_ANISOTROPY`]. It bounds the time of every lookup, whatever the footprint: variance-compensated EWA of quality Q reads
-    /// some `4 pi Q^2 A` texels at most (twice as many where sizes are no powers of two), probes `8 (2 A + 1)`.
+    /// [`MAX_ANISOTROPY`]. It bounds the time of every lookup, whatever the footprint: variance-compensated EWA of
+    /// quality Q reads some `4 pi Q^2 A` texels at most (twice as many where sizes are no powers of two), probes `8
+    /// (2 A + 1)`.
     pub max_anisotropy: f64,
     /// Factor on all footprints: below 1 for sharper, above 1 for smoother textures. Not a number: 0.
     pub width: f64,

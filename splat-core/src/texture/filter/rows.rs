@@ -85,11 +85,11 @@ impl RowKernel {
         }
     }
 
-    /// Variance-compensated EWA. The result shall be the `ellipse`'s kernel over bilinearly interpolated texels of level 0, of
-    /// variance `KERNEL_VARIANCE M + 1/6`. A level's texels are blurred already by its known variance, so the kernel there makes up the rest
-    /// (E5): `S (M + (1/6 - variance) / KERNEL_VARIANCE) S`, with S the level's texels per texel of level 0, per axis.
-    /// The level is the coarsest whose texels are not larger than `minor / quality`; the rest is positive
-    /// since quality exceeds `sqrt(1 / (12 KERNEL_VARIANCE)) = .78`.
+    /// Variance-compensated EWA. The result shall be the `ellipse`'s kernel over bilinearly interpolated texels of
+    /// level 0, of variance `KERNEL_VARIANCE M + 1/6`. A level's texels are blurred already by its known variance, so
+    /// the kernel there makes up the rest (E5): `S (M + (1/6 - variance) / KERNEL_VARIANCE) S`, with S the level's
+    /// texels per texel of level 0, per axis. The level is the coarsest whose texels are not larger than `minor /
+    /// quality`; the rest is positive since quality exceeds `sqrt(1 / (12 KERNEL_VARIANCE)) = .78`.
     pub fn variance_compensated(pyramid: &Pyramid, place: DVec2, ellipse: &Ellipse, quality: f64) -> Self {
         let levels = pyramid.levels();
         let fine_enough = levels.partition_point(|level| quality * level.coarseness() <= ellipse.minor);

@@ -1,7 +1,7 @@
 //! Summed-area tables (Crow 1984): the mean of any upright rectangle in constant time.
 
 use super::assembly::{ProbeRow, Probes};
-use super::ellipse::{Ellipse, place};
+use super::ellipse::{Ellipse, MAX_PERIODS, place};
 use super::mean::{Average, Mean};
 use crate::texture::Footprint;
 use crate::texture::pyramid::{Pyramid, Wrap};
@@ -45,13 +45,16 @@ impl SummedArea {
         Self { size, channels, wrap: pyramid.wrap(), sums, range }
     }
 
-    /// The mean over an upright rectangle with any corners, texels being squares of one colour. Position and sides in units
-    /// of (s, t); a side is at least a texel, at most some periods.
+    /// The mean over an upright rectangle with any corners, texels being squares of one colour. Position and sides in
+    /// units of (s, t); a side is at least a texel and at most
+    /// `2 MAX_PERIODS` (not a number: a texel).
     pub fn rectangle(&self, center: Vec2, sides: Vec2) -> Average {
-        let half = 0.5 * sides;
-        let rectangle = Footprint { semi_axes: [Vec2::new(half.x, 0.0), Vec2::new(0.0, half.y)] };
-        let [xx, _, yy] = Ellipse::new(&rectangle, self.size, f64::INFINITY).matrix;
-        self.mean(place(self.wrap, center), 2.0 * DVec2::new(xx.sqrt(), yy.sqrt())).rounded()
+        let texels = |side: f32, count: u32| {
+            let side = if side.is_nan() { 0.0 } else { f64::from(side).clamp(0.0, 2.0 * MAX_PERIODS) };
+            side * f64::from(count)
+        };
+        let sides = DVec2::new(texels(sides.x, self.size[0]), texels(sides.y, self.size[1]));
+        self.mean(place(self.wrap, center), sides).rounded()
     }
 
     /// Footprint Assembly (seed 2) of squares from the table, along the footprint's longer axis. The squares stay
@@ -114,7 +117,8 @@ impl SummedArea {
     }
 }
 
-/// An integral along one axis of the wrapped texture as a sum of few integrals P(x) from 0 to x within it: pairs of factor and x.
+/// An integral along one axis of the wrapped texture as a sum of few integrals P(x) from 0 to x within it: pairs of
+/// factor and x.
 #[derive(Debug, Clone, Copy, Default)]
 struct Terms {
     terms: [(f64, f64); 6],

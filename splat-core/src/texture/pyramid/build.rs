@@ -88,7 +88,8 @@ fn overlaps(fine: u32, coarse: u32) -> Vec<Overlap> {
     (0..fine).map(overlap).collect()
 }
 
-/// The second moment of a coarse texel's weights about its centre, in squared fine texels, as a mean over the coarse texels.
+/// The second moment of a coarse texel's weights about its centre, in squared fine texels, as a mean over the coarse
+/// texels.
 fn box_variance(fine: u32, coarse: u32) -> f64 {
     let texel_size = f64::from(fine) / f64::from(coarse);
     let mut moments = 0.0;

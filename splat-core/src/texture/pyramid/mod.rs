@@ -140,8 +140,8 @@ impl Pyramid {
     /// channels the last is alpha, which is linear.
     ///
     /// A value that is no finite number (renderers write such) would spread over every level, so it is replaced
-    /// by the mean of the finite ones of the same channel among the eight texels around, or by 0 where there are none, and
-    /// counted: see [`Self::replaced`].
+    /// by the mean of the finite ones of the same channel among the eight texels around, or by 0 where there are
+    /// none, and counted: see [`Self::replaced`].
     ///
     /// # Errors
     /// Where sizes, channels or the number of values are out of range or do not fit each other.
@@ -201,8 +201,9 @@ impl Pyramid {
         self.levels.len() - 1
     }
 
-    /// The texel at column x and row y of a level (a level beyond the last is the last), linear; channels that the texture does
-    /// not have are 0. Any x and y: what lies outside follows the wraps, also at the coarsest level (E7).
+    /// The texel at column x and row y of a level (a level beyond the last is the last), linear; channels that the
+    /// texture does not have are 0. Any x and y: what lies outside follows the wraps, also at the coarsest level
+    /// (E7).
     #[inline]
     pub fn texel(&self, level: usize, x: i64, y: i64) -> [f32; 4] {
         let level = &self.levels[level.min(self.last())];

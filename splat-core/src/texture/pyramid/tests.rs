@@ -55,7 +55,8 @@ fn no_step_is_more_than_twofold() {
         let pyramid = pyramid([count, 1], 1, vec![0.0; count as usize]);
         for pair in pyramid.levels().windows(2) {
             assert!(pair[1].coarseness() <= 2.0 * pair[0].coarseness());
-            // A box over piecewise constant texels: between (t^2 - 1) / 12 and (t^2 + 1) / 12, or twice that for short rows.
+            // A box over piecewise constant texels: between (t^2 - 1) / 12 and (t^2 + 1) / 12, or twice that for
+            // short rows.
             let t = pair[1].coarseness();
             assert!(pair[1].variance()[0] >= (t * t - 1.0) / 12.0 - 1e-9);
             assert!(pair[1].variance()[0] <= (t * t + 2.0) / 12.0 + 1e-9);
