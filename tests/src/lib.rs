@@ -10,6 +10,7 @@
 //! - [`random`]: deterministic random numbers for scenes;
 //! - [`scenes`]: small scenes made in code;
 //! - [`textures`]: what the tests of footprints, differentials and mappings share;
+//! - [`texture_truth`]: the integral that texture filters approximate, and images for it;
 //! - [`tolerances`]: every tolerance with its derivation.
 
 pub mod analytic;
@@ -21,5 +22,6 @@ pub mod listing;
 pub mod printed_textures;
 pub mod random;
 pub mod scenes;
+pub mod texture_truth;
 pub mod textures;
 pub mod tolerances;

@@ -11,9 +11,11 @@ pub mod mapping;
 pub mod pyramid;
 
 pub use differentials::{Ray, RayDifferential, Surface, SurfaceDifferentials};
+pub use filter::{Filter, Magnification, Probes, Quality, Sampler, SummedArea};
 pub use footprint::{Footprint, FullSides, PixelDerivatives, PrincipalAxes};
 pub use function::{Checkerboard, Fbm, TextureFunction, ZonePlate};
 pub use mapping::{
     CylinderHeight, CylindricalMapping, PlanarMapping, SolidMapping, SpacePoint, SphericalMapping,
     TexturePoint, UvMapping,
 };
+pub use pyramid::{Pyramid, PyramidError, Texels, Wrap};

@@ -1,1 +1,0 @@
-//! An image in levels of falling resolution. Seed 1.
