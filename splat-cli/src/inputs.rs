@@ -21,7 +21,7 @@ pub fn read(paths: &[PathBuf]) -> anyhow::Result<(Cloud, Vec<ImportReport>)> {
 /// Joins clouds, each with its name for messages.
 ///
 /// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
-/// told from another. Missing opacities are opaque; areas are kept only if every cloud has them.
+/// told from another. Missing opacities are opaque; areas and texture coordinates are kept only if every cloud has them.
 fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     if clouds.len() > 1 {
         clouds.retain(|(_, cloud)| !cloud.is_empty());
@@ -41,6 +41,8 @@ fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     }
     joined.areas =
         clouds.iter().map(|(_, cloud)| cloud.areas.clone()).collect::<Option<Vec<_>>>().map(|a| a.concat());
+    let coordinates = clouds.iter().map(|(_, cloud)| cloud.texture_coordinates.clone());
+    joined.texture_coordinates = coordinates.collect::<Option<Vec<_>>>().map(|parts| parts.concat());
     joined.oriented = clouds.iter().all(|(_, cloud)| cloud.oriented);
     let discs = all_or_none(&clouds, "round splats", |cloud| match &cloud.shapes {
         Shapes::Discs(sizes) => Some(sizes.clone()),
