@@ -2,7 +2,7 @@
 
 use super::{CameraSplat, Dropped, View, camera_splat, count_dropped, from_eye, shows_back};
 use crate::{Cloud, RenderOptions, Shapes};
-use glam::{Vec3, Vec3Swizzles};
+use glam::Vec3Swizzles;
 use std::cmp::Ordering;
 use std::ops::Range;
 
