@@ -358,12 +358,14 @@ pub const SAMPLED_AREA: f64 = 4.0 / 16_777_216.0;
 pub const INTERPOLATED: f64 = 10.0 * 4.0 * 20.0 / 16_777_216.0;
 
 /// The nearest other surfel on an evenly sampled mesh, in spacings (the square root of the area of one): least, and mean.
-/// The densest packing has 1.07, random points 0.5 in the mean. A quality, not an error.
-pub const EVEN_SPACING: [f64; 2] = [0.5, 0.75];
+/// The densest packing has 1.07, random points 0.50 in the mean and 0.01 as the least. Measured: 0.71 and 0.83.
+pub const EVEN_SPACING: [f64; 2] = [0.65, 0.8];
 
-/// The standard deviation of the distance to the nearest other surfel, over its mean. Random points have 0.52.
-pub const SPACING_SCATTER: f64 = 0.15;
+/// The standard deviation of the distance to the nearest other surfel, over its mean. Random points have 0.52. Measured:
+/// 0.090.
+pub const SPACING_SCATTER: f64 = 0.12;
 
 /// Surfels on a part of a mesh's surface against its share, for 1000 expected on a side of a cube (250 in its middle):
-/// what the candidates' strata and the elimination leave. Random points would have a standard deviation of 3 % (6 %).
+/// 4 * 1000 random candidates have a standard deviation of 1.6 % (3.2 %), of which the elimination evens out a part.
+/// Measured: 1.8 %.
 pub const EVEN_SHARE: f64 = 0.05;

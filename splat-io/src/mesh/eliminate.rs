@@ -35,22 +35,20 @@ pub fn eliminate(candidates: &[Candidate], keep: usize, progress: &mut dyn FnMut
     let crowding = Crowding::new(keep as f64 / candidates.len() as f64);
     let grid = Grid::new(candidates);
     let mut weights = vec![0.0; candidates.len()];
-    for (index, weight) in weights.iter_mut().enumerate() {
-        grid.neighbors(candidates, index, |_, distance| *weight += crowding.weight(distance));
+    for (place, weight) in weights.iter_mut().enumerate() {
+        grid.neighbors(place, |_, distance| *weight += crowding.weight(distance));
     }
     progress(0.3);
     let mut heap = Heap::new(weights);
     let removals = candidates.len().saturating_sub(keep);
     for removal in 0..removals {
         let removed = heap.pop();
-        grid.neighbors(candidates, removed as usize, |index, distance| {
-            heap.lighten(index, crowding.weight(distance));
-        });
+        grid.neighbors(removed as usize, |place, distance| heap.lighten(place, crowding.weight(distance)));
         if removal % 4096 == 0 {
             progress(0.3 + 0.7 * removal as f64 / removals as f64);
         }
     }
-    let mut kept = heap.items;
+    let mut kept: Vec<u32> = heap.items.into_iter().map(|place| grid.indices[place as usize]).collect();
     kept.sort_unstable();
     kept
 }
@@ -80,9 +78,11 @@ impl Crowding {
 
 /// Points by cells of a cubic lattice, in a hash table.
 struct Grid {
-    /// The bucket of b is `indices[starts[b]..starts[b + 1]]`.
-    starts: Vec<u32>,
+    /// The candidates, bucket after bucket: those of b are `candidates[starts[b]..starts[b + 1]]`.
+    candidates: Vec<Candidate>,
+    /// Where each of them was before.
     indices: Vec<u32>,
+    starts: Vec<u32>,
     mask: u32,
 }
 
@@ -108,26 +108,25 @@ impl Grid {
             indices[*end as usize] = index as u32;
             *end += 1;
         }
-        Self { starts, indices, mask }
+        let candidates = indices.iter().map(|&index| candidates[index as usize]).collect();
+        Self { candidates, indices, starts, mask }
     }
 
-    /// Visits the points within reach of a point, save itself, with their distances.
-    fn neighbors(&self, candidates: &[Candidate], index: usize, mut visit: impl FnMut(u32, f32)) {
-        let Candidate { place, normal } = candidates[index];
+    /// Visits the points within reach of the one at `own`, save itself, with their distances.
+    fn neighbors(&self, own: usize, mut visit: impl FnMut(u32, f32)) {
+        let Candidate { place, normal } = self.candidates[own];
         let [x, y, z] = cell(place);
         for (dz, dy) in [-1, 0, 1].into_iter().flat_map(|dz| [-1, 0, 1].map(|dy| (dz, dy))) {
             let first = bucket([x.wrapping_sub(1), y.wrapping_add(dy), z.wrapping_add(dz)]);
             for dx in 0..3 {
                 let bucket = (first.wrapping_add(dx) & self.mask) as usize;
-                let bucket = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
-                for &other in self.indices[bucket].iter().take(MOST_OF_A_CELL) {
-                    let candidate = &candidates[other as usize];
+                let (start, end) = (self.starts[bucket] as usize, self.starts[bucket + 1] as usize);
+                let end = end.min(start + MOST_OF_A_CELL);
+                for (other, candidate) in (start..end).zip(&self.candidates[start..end]) {
                     let distance = (candidate.place - place).length_squared();
-                    if distance < REACH * REACH
-                        && other as usize != index
-                        && candidate.normal.dot(normal) > LEAST_COSINE
+                    if distance < REACH * REACH && other != own && candidate.normal.dot(normal) > LEAST_COSINE
                     {
-                        visit(other, distance.sqrt());
+                        visit(other as u32, distance.sqrt());
                     }
                 }
             }

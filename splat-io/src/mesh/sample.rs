@@ -28,8 +28,8 @@ pub struct Sampled {
 
 /// Covers a mesh evenly with `count` surfels. The same arguments give the same surfels, on every machine.
 ///
-/// - *Where*: candidates are stratified along the cumulative area, of low discrepancy within a triangle, and thinned out
-///   until what is left is evenly spread (blue noise), whatever the triangles' sizes. `seed` changes the candidates.
+/// - *Where*: four times as many random candidates are thinned out until what is left is evenly spread (blue noise),
+///   whatever the triangles' sizes. `seed` changes the candidates.
 /// - *Area*: the mesh's over `count`, for each.
 /// - *Normal*: that of the triangle, since splats are tangent to the surface. The corners' order tells the outside, or
 ///   the vertices' normals, where the mesh has some.
@@ -42,8 +42,8 @@ pub struct Sampled {
 /// `progress` is told the share done, 0 to 1.
 ///
 /// # Errors
-/// [`Error::Invalid`] if `count` is 0 or more than [`MOST_SURFELS`], and as [`Mesh::check`]; [`Error::Empty`] if no
-/// triangle has an area.
+/// [`Error::Invalid`] if `count` is 0 or more than [`MOST_SURFELS`], or if no triangle has an area; else as
+/// [`Mesh::check`].
 pub fn sample_surface(
     mesh: &Mesh,
     count: usize,
@@ -56,7 +56,8 @@ pub fn sample_surface(
     mesh.check()?;
     let (area, skipped) = mesh.area();
     if area == 0.0 || !area.is_finite() {
-        return Err(Error::Empty(format!("{} triangles of the area {area}", mesh.triangles.len())));
+        let found = format!("{area} in {} triangles", mesh.triangles.len());
+        return Err(Error::invalid("area of the mesh", found, "more than 0, and finite"));
     }
     let places = scatter(mesh, area, CANDIDATES * count, seed);
     let kept = thin_out(mesh, &places, area, count, progress);
@@ -119,28 +120,28 @@ impl Place {
     }
 }
 
-/// `count` places, stratified along the cumulative area: each triangle has its share to within one, the k-th place on a
-/// triangle being the k-th point of the R2 sequence (Roberts 2018), shifted at random and folded into the triangle.
+/// `count` places, independent and uniformly distributed over the surface, in the triangles' order.
+///
+/// No strata, no sequence of low discrepancy: they would be more even on large triangles than on small ones, and the
+/// elimination keeps more of what is even. (With a sequence the sides of a cube, meshed differently, had up to 10 % too
+/// many or too few surfels; so they have 2 %.)
 fn scatter(mesh: &Mesh, area: f64, count: usize, seed: u64) -> Vec<Place> {
     const STREAM: u64 = 0x5375_7266_656c_7321;
-    const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let mut random = Pcg32::new(seed, STREAM);
     let mut unit = move || f64::from(random.next_u32()) / 4_294_967_296.0;
+    let mut targets: Vec<f64> = (0..count).map(|_| unit() * area).collect();
+    targets.sort_unstable_by(f64::total_cmp);
     let mut places = Vec::with_capacity(count);
     let (mut reached, mut last) = (0.0, None);
-    let mut target = unit() / count as f64 * area;
     for triangle in 0..mesh.triangles.len() {
         let Some(own) = mesh.triangle_area(triangle) else { continue };
         reached += own;
         last = Some(triangle);
-        let mut point = [unit(), unit()];
-        while target < reached && places.len() < count {
-            places.push(place(triangle, point));
-            point = [(point[0] + R2[0]).fract(), (point[1] + R2[1]).fract()];
-            target = (places.len() as f64 + unit()) / count as f64 * area;
+        while places.len() < count && targets[places.len()] < reached {
+            places.push(place(triangle, [unit(), unit()]));
         }
     }
-    // Rounding of the sum can leave the last stratum open.
+    // Rounding of the sum can leave some over.
     while let Some(triangle) = last.filter(|_| places.len() < count) {
         places.push(place(triangle, [unit(), unit()]));
     }
