@@ -23,18 +23,50 @@ pub struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render clouds to a picture
+    /// Render clouds and meshes to a picture
     Render(Box<RenderArguments>),
+    /// Make a cloud (.ply) from meshes and clouds
+    ///
+    /// Meshes are covered evenly with surfels: an OBJ file, and a PLY file that has faces (which render takes for the cloud
+    /// of its vertices). Each surfel has an area, a normal, axes and, where the mesh has them, colour and texture
+    /// coordinates. Clouds are written as they are, several as one; what they lack is estimated by render.
+    Convert(ConvertArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
     /// Render a scene made in code, which shows what the program does
     Demo(DemoArguments),
 }
 
+/// `splat convert`.
+#[derive(Debug, Args)]
+pub struct ConvertArguments {
+    /// Meshes (.obj, or .ply with faces) and clouds (.ply); several become one cloud
+    #[arg(required = true, value_name = "IN")]
+    pub inputs: Vec<PathBuf>,
+    /// The cloud: .ply
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Surfels on each mesh
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_POINTS, value_parser = values::points)]
+    pub points: usize,
+    /// Seed of the surfels' places
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Write text instead of binary numbers
+    #[arg(long)]
+    pub ascii: bool,
+    /// How talkative the program is.
+    #[command(flatten, next_help_heading = "Program")]
+    pub talk: TalkArguments,
+}
+
+/// Surfels on a mesh: one spacing is then below two pixels where the surface fills a picture of the default size.
+pub const DEFAULT_POINTS: usize = 200_000;
+
 /// `splat info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
-    /// A cloud (.ply) or a camera (.json)
+    /// A cloud (.ply), a mesh (.obj) or a camera (.json)
     pub file: PathBuf,
     /// Write JSON
     #[arg(long)]
@@ -67,7 +99,7 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply); several are rendered as one
+    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
@@ -303,6 +335,21 @@ mod tests {
         }
         for line in ["--up x", "--filter sinc", "--engine gpu"] {
             assert_eq!(render(line).unwrap_err(), ErrorKind::InvalidValue, "{line}");
+        }
+    }
+
+    #[test]
+    fn convert_counts_surfels() {
+        let parse =
+            |line: &str| Arguments::try_parse_from(line.split_whitespace()).map(|parsed| parsed.command);
+        let Command::Convert(arguments) =
+            parse("splat convert a.obj b.ply -o c.ply --points 9 --seed 3").unwrap()
+        else {
+            panic!("not convert")
+        };
+        assert_eq!((arguments.inputs.len(), arguments.points, arguments.seed), (2, 9, 3));
+        for line in ["convert a.obj", "convert -o c.ply", "convert a.obj -o c.ply --points 0"] {
+            assert!(parse(&format!("splat {line}")).is_err(), "{line}");
         }
     }
 

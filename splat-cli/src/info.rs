@@ -2,9 +2,10 @@
 
 mod camera;
 mod cloud;
+mod mesh;
 
 use crate::arguments::InfoArguments;
-use crate::console;
+use crate::{console, inputs};
 use std::path::Path;
 
 /// Runs the command.
@@ -14,6 +15,9 @@ use std::path::Path;
 pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
     let (json, text) = if is_camera(&arguments.file) {
         let summary = camera::Summary::read(&arguments.file)?;
+        (serde_json::to_string_pretty(&summary)?, summary.to_string())
+    } else if inputs::is_obj(&arguments.file) {
+        let summary = mesh::Summary::read(&arguments.file)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else {
         let summary = cloud::Summary::read(&arguments.file)?;

@@ -1,27 +1,102 @@
-//! The clouds of the command line, read and joined into one.
+//! The clouds and meshes of the command line, read and joined into one cloud.
 
+use crate::arguments::DEFAULT_POINTS;
 use anyhow::{Context, bail, ensure};
 use glam::DVec3;
 use splat_core::{Cloud, Shapes};
-use splat_io::{Import, ImportReport, read_ply};
+use splat_io::{
+    Import, ImportReport, MeshImport, Sampled, ply_has_faces, read_obj, read_ply, read_ply_mesh,
+    sample_surface,
+};
 use std::path::{Path, PathBuf};
 
-/// Reads clouds and joins them: the first file's splats come first.
+/// How meshes become clouds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sampling {
+    /// Surfels on each mesh.
+    pub points: usize,
+    /// Of their places.
+    pub seed: u64,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self { points: DEFAULT_POINTS, seed: 0 }
+    }
+}
+
+/// What files are read as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// How meshes are sampled.
+    pub sampling: Sampling,
+    /// Whether a PLY file with faces is a mesh; else it is the cloud of its vertices.
+    pub with_faces: bool,
+}
+
+/// Reads clouds and meshes and joins them: the first file's splats come first. `progress` is told the share done, 0 to 1.
 ///
 /// # Errors
-/// What the reader says; clouds that do not go together.
-pub fn read(paths: &[PathBuf]) -> anyhow::Result<(Cloud, Vec<ImportReport>)> {
-    let imports: Vec<Import> = paths.iter().map(|path| read_ply(path)).collect::<Result<_, _>>()?;
+/// What the readers say; meshes without an area; clouds that do not go together.
+pub fn read(
+    paths: &[PathBuf],
+    reading: Reading,
+    progress: &mut dyn FnMut(f64),
+) -> anyhow::Result<(Cloud, Vec<ImportReport>)> {
+    let one = |(index, path): (usize, &PathBuf)| {
+        read_one(path, reading, &mut |done| progress((index as f64 + done) / paths.len() as f64))
+    };
+    let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
     let (clouds, reports): (Vec<Cloud>, Vec<ImportReport>) =
         imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
     let named: Vec<(&Path, Cloud)> = reports.iter().map(|report| report.path.as_path()).zip(clouds).collect();
     Ok((join(named)?, reports))
 }
 
+/// Whether a file is an OBJ mesh, by its name.
+pub fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
+}
+
+/// Reads a cloud, or a mesh as a cloud.
+fn read_one(path: &Path, reading: Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
+    if is_obj(path) {
+        sampled(read_obj(path)?, reading.sampling, progress)
+    } else if reading.with_faces && ply_has_faces(path)? {
+        sampled(read_ply_mesh(path)?, reading.sampling, progress)
+    } else {
+        Ok(read_ply(path)?)
+    }
+}
+
+/// A mesh as a cloud.
+fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
+    let MeshImport { mesh, mut report } = import;
+    let Sampled { cloud, area, skipped, without_texture } =
+        sample_surface(&mesh, sampling.points, sampling.seed, progress)
+            .with_context(|| report.path.display().to_string())?;
+    let (points, triangles) = (cloud.len(), mesh.triangles.len());
+    report
+        .assumptions
+        .push(format!("the mesh of {triangles} triangles, area {area}, is covered with {points} surfels"));
+    report.assumptions.push(if mesh.normal_triangles.is_empty() {
+        "counter-clockwise triangles are seen from outside".to_owned()
+    } else {
+        "the normals of vertices tell the outside; splats lie in their triangles".to_owned()
+    });
+    if skipped > 0 {
+        report.assumptions.push(format!("{skipped} triangles without an area are skipped"));
+    }
+    if without_texture > 0 {
+        report.assumptions.push(format!("{without_texture} surfels without texture coordinates have (0, 0)"));
+    }
+    Ok(Import { cloud, report })
+}
+
 /// Joins clouds, each with its name for messages.
 ///
 /// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
-/// told from another. Missing opacities are opaque; areas are kept only if every cloud has them.
+/// told from another. Missing opacities are opaque; areas and texture coordinates are kept only if every cloud has them.
 fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     if clouds.len() > 1 {
         clouds.retain(|(_, cloud)| !cloud.is_empty());
@@ -41,6 +116,8 @@ fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     }
     joined.areas =
         clouds.iter().map(|(_, cloud)| cloud.areas.clone()).collect::<Option<Vec<_>>>().map(|a| a.concat());
+    let coordinates = clouds.iter().map(|(_, cloud)| cloud.texture_coordinates.clone());
+    joined.texture_coordinates = coordinates.collect::<Option<Vec<_>>>().map(|parts| parts.concat());
     joined.oriented = clouds.iter().all(|(_, cloud)| cloud.oriented);
     let discs = all_or_none(&clouds, "round splats", |cloud| match &cloud.shapes {
         Shapes::Discs(sizes) => Some(sizes.clone()),

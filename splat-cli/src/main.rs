@@ -8,6 +8,7 @@
 mod arguments;
 mod choices;
 mod console;
+mod convert;
 mod demo;
 mod describe;
 mod engine;
@@ -35,6 +36,7 @@ const USAGE: u8 = 2;
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };

@@ -4,6 +4,7 @@ use crate::arguments::{OutputArguments, RenderArguments};
 use crate::choices::ExrTypeChoice;
 use crate::console::Console;
 use crate::engine::Engine;
+use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
 use crate::{describe, inputs, output, resolve};
@@ -30,7 +31,8 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
-    let (input, time) = progress.stage("read", |_| inputs::read(&arguments.inputs));
+    let reading = Reading { sampling: Sampling::default(), with_faces: false };
+    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
     times.read = time;
     let (mut cloud, reports) = input?;
     note_assumptions(console, &cloud, &reports);

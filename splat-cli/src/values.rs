@@ -1,6 +1,7 @@
 //! The syntax of options that are no plain word: what each text means, and what is said about a wrong one.
 
 use splat_core::{AovSelection, PixelRect};
+use splat_io::mesh::MOST_SURFELS;
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
@@ -120,6 +121,12 @@ pub fn view(text: &str) -> Result<ViewDirection, String> {
 pub fn blades(text: &str) -> Result<u32, String> {
     let blades = text.parse().ok().filter(|blades| matches!(blades, 0 | 3..=64));
     blades.ok_or_else(|| "expected 0 (round) or 3 to 64".to_owned())
+}
+
+/// `--points`.
+pub fn points(text: &str) -> Result<usize, String> {
+    let points = text.parse().ok().filter(|points| (1..=MOST_SURFELS).contains(points));
+    points.ok_or_else(|| format!("expected a whole number, 1 to {MOST_SURFELS}"))
 }
 
 /// `--thickness`.

@@ -196,6 +196,78 @@ fn a_claim_of_a_billion_points_fails_at_once_in_little_memory() {
     }
 }
 
+/// A square of two triangles, textured.
+const SQUARE: &str =
+    "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+
+#[test]
+fn a_mesh_is_converted_and_both_render_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("square.obj"), SQUARE).unwrap();
+    let said = succeeds(folder.path(), "convert square.obj -o surfels.ply --points 5000 --seed 3");
+    assert!(String::from_utf8_lossy(&said.stderr).starts_with("surfels.ply: 5000 points"));
+    let cloud = splat_io::read_ply(&folder.path().join("surfels.ply")).unwrap().cloud;
+    assert_eq!(cloud.len(), 5000);
+    for (index, coordinates) in cloud.texture_coordinates.as_ref().unwrap().iter().enumerate() {
+        let place = cloud.world_position(index).as_vec3();
+        assert!((2.0 * coordinates.center - place.truncate()).length() < 1e-5, "{place} {coordinates:?}");
+    }
+    let info = String::from_utf8(succeeds(folder.path(), "info surfels.ply").stdout).unwrap();
+    assert!(
+        info.contains("ds_du: derivative of a texture coordinate") && info.contains("texture      yes"),
+        "{info}"
+    );
+    let info = String::from_utf8(succeeds(folder.path(), "info square.obj").stdout).unwrap();
+    assert!(info.contains("triangles    2, of which without an area: 0\narea         4"), "{info}");
+    let json = succeeds(folder.path(), "info --json square.obj").stdout;
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&json).unwrap()["textured"], 2);
+
+    // The same seed and number give the same cloud again, and so the same picture.
+    let options = "--view front --size 64x48 --spp 4";
+    succeeds(folder.path(), "convert square.obj -o default.ply");
+    succeeds(folder.path(), &format!("render default.ply -o a.png {options}"));
+    succeeds(folder.path(), &format!("render square.obj -o b.png {options}"));
+    let [a, b] = ["a.png", "b.png"].map(|name| read_png(&folder.path().join(name)));
+    assert_eq!(a, b);
+    let (width, height, pixels) = a;
+    assert_eq!(pixels[(height / 2 * width + width / 2) as usize][3], 255);
+}
+
+#[test]
+fn faces_of_a_ply_file_count_for_convert_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    fs::write(folder.path().join("mesh.ply"), mesh).unwrap();
+    succeeds(folder.path(), "convert mesh.ply -o surfels.ply --points 100 --ascii");
+    succeeds(folder.path(), "convert surfels.ply -o copy.ply");
+    let read = |name: &str| splat_io::read_ply(&folder.path().join(name)).unwrap().cloud;
+    assert_eq!(read("surfels.ply").len(), 100);
+    assert_eq!(read("surfels.ply"), read("copy.ply"));
+    let stats = succeeds(folder.path(), "render mesh.ply -o out.png --size 32x24 --spp 1 --stats -").stdout;
+    assert_eq!(serde_json::from_slice::<serde_json::Value>(&stats).unwrap()["splats"]["read"], 3);
+}
+
+#[test]
+fn meshes_that_cannot_be_converted_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("points.obj"), "v 0 0 0\n").unwrap();
+    fs::write(folder.path().join("line.obj"), "v 0 0 0\nv 1 1 1\nf 1 2 1\n").unwrap();
+    fs::write(folder.path().join("wrong.obj"), "v 0 0 0\nf 1 2 x\n").unwrap();
+    assert!(fails(folder.path(), "convert points.obj -o out.ply", 1).contains("no face among 1 vertices"));
+    assert!(
+        fails(folder.path(), "convert line.obj -o out.ply", 1)
+            .contains("line.obj: area of the mesh: found 0")
+    );
+    assert!(
+        fails(folder.path(), "convert wrong.obj -o out.ply", 1)
+            .contains("wrong.obj: line 2: found `f 1 2 x`")
+    );
+    assert!(fails(folder.path(), "convert wrong.obj -o out.obj", 2).contains("ends in .ply"));
+    assert!(fails(folder.path(), "convert wrong.obj -o out.ply --points 0", 2).contains("1 to 20000000"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "nothing is left behind");
+}
+
 /// The folder of real files, if there is one.
 fn real_files() -> Option<PathBuf> {
     std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())

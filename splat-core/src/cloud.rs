@@ -1,7 +1,7 @@
 //! A cloud of oriented point splats, as it comes from a file.
 
 use crate::Error;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// Oriented point splats, as a structure of arrays.
 ///
@@ -25,6 +25,8 @@ pub struct Cloud {
     /// Surface area that each splat stands for, in squared scene units; `None` is unknown (see
     /// [`crate::prepare`]). SPEC section 4 turns it into normalised weights.
     pub areas: Option<Vec<f32>>,
+    /// Where each splat lies on a texture; `None` where the cloud has no texture coordinates.
+    pub texture_coordinates: Option<Vec<TextureCoordinates>>,
     /// Whether the normals tell the outside from the inside. Without that every splat faces the camera.
     pub oriented: bool,
 }
@@ -60,10 +62,45 @@ impl Shapes {
     }
 }
 
+/// The part of a texture that a splat carries: an affine map from the splat's (u, v), in units of sigma, to texture
+/// coordinates (s, t). A point of the splat is at `center + u * per_u + v * per_v`.
+///
+/// One unit of s or t is the whole texture; s grows to the right, t upwards, and (0, 0) is the lower left corner of the
+/// image, as in OBJ files. Values outside [0, 1] are left to the texture's wrap mode.
+///
+/// (u, v) follow the two axes of [`Shapes::Ellipses`]. The axes of round splats are not the caller's, so there the
+/// derivatives mean nothing; only the centre does.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TextureCoordinates {
+    /// (s, t) at the splat's centre.
+    pub center: Vec2,
+    /// d(s, t)/du: the change of (s, t) along the first axis, per sigma. With `per_v` zero: unknown.
+    pub per_u: Vec2,
+    /// d(s, t)/dv: the change of (s, t) along the second axis, per sigma.
+    pub per_v: Vec2,
+}
+
+impl TextureCoordinates {
+    /// The (s, t) of a point of the splat, whose (u, v) are in units of sigma.
+    pub fn at(&self, uv: Vec2) -> Vec2 {
+        self.center + uv.x * self.per_u + uv.y * self.per_v
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.center.is_finite() && self.per_u.is_finite() && self.per_v.is_finite()
+    }
+
+    /// The six numbers: centre, derivative along u, derivative along v, s before t.
+    pub fn to_array(&self) -> [f32; 6] {
+        [self.center.x, self.center.y, self.per_u.x, self.per_u.y, self.per_v.x, self.per_v.y]
+    }
+}
+
 /// Why a splat is never rendered. SPEC section 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Defect {
-    /// A coordinate, normal, size, colour, opacity or area is infinite or not a number.
+    /// A coordinate, normal, size, colour, opacity, area or texture coordinate is infinite or not a number.
     NotFinite,
     /// The normal, or the area spanned by the two axes, is zero.
     ZeroNormal,
@@ -130,6 +167,7 @@ impl Cloud {
             ("colors", self.colors.as_ref().map(Vec::len)),
             ("opacities", self.opacities.as_ref().map(Vec::len)),
             ("areas", self.areas.as_ref().map(Vec::len)),
+            ("texture coordinates", self.texture_coordinates.as_ref().map(Vec::len)),
         ];
         for (what, length) in lengths {
             if let Some(found) = length.filter(|&found| found != expected) {
@@ -149,6 +187,7 @@ impl Cloud {
             && self.colors.as_ref().is_none_or(|colors| colors[index].is_finite())
             && self.opacities.as_ref().is_none_or(|opacities| opacities[index].is_finite())
             && self.areas.as_ref().is_none_or(|areas| areas[index].is_finite())
+            && self.texture_coordinates.as_ref().is_none_or(|coordinates| coordinates[index].is_finite())
             && match &self.shapes {
                 Shapes::Discs(sizes) => sizes[index].is_finite(),
                 Shapes::Ellipses(axes) => axes[index].iter().all(|axis| axis.is_finite()),
@@ -208,4 +247,38 @@ pub fn choose_origin(positions: &[DVec3]) -> DVec3 {
         spread = spread.max(quantile(last - last / 4) - quantile(last / 4));
     }
     if median.abs().max_element() < 16.0 * spread { DVec3::ZERO } else { median }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn textured(coordinates: TextureCoordinates) -> Cloud {
+        let mut cloud = Cloud::from_points(&[DVec3::ZERO]);
+        cloud.normals = vec![Vec3::Z];
+        cloud.shapes = Shapes::Ellipses(vec![[Vec3::X, Vec3::Y]]);
+        cloud.texture_coordinates = Some(vec![coordinates]);
+        cloud
+    }
+
+    #[test]
+    fn texture_coordinates_are_checked_as_all_else() {
+        let good = TextureCoordinates { center: Vec2::ONE, per_u: Vec2::X, per_v: -2.0 * Vec2::Y };
+        assert_eq!(good.at(Vec2::new(2.0, 0.5)), Vec2::new(3.0, 0.0));
+        assert_eq!(textured(good).defect(0), None);
+        let bad = [
+            TextureCoordinates { center: Vec2::NAN, ..good },
+            TextureCoordinates { per_u: Vec2::new(0.0, f32::INFINITY), ..good },
+            TextureCoordinates { per_v: Vec2::new(f32::NEG_INFINITY, 0.0), ..good },
+        ];
+        for coordinates in bad {
+            assert_eq!(textured(coordinates).defect(0), Some(Defect::NotFinite), "{coordinates:?}");
+        }
+        let mut cloud = textured(good);
+        cloud.texture_coordinates = Some(Vec::new());
+        assert_eq!(
+            cloud.check_lengths().unwrap_err().to_string(),
+            "cloud: texture coordinates has 0 entries for 1 positions"
+        );
+    }
 }

@@ -71,6 +71,12 @@ pub enum Usage {
     Area,
     /// A component of a tangent axis.
     Tangent,
+    /// A texture coordinate.
+    TextureCoordinate,
+    /// A derivative of a texture coordinate along a tangent axis.
+    TextureDerivative,
+    /// A list of the vertices of a face.
+    Face,
     /// Nothing, for this reason.
     Unused(&'static str),
 }
@@ -85,6 +91,9 @@ impl fmt::Display for Usage {
             Self::Size => write!(f, "size"),
             Self::Area => write!(f, "area"),
             Self::Tangent => write!(f, "tangent axis"),
+            Self::TextureCoordinate => write!(f, "texture coordinate"),
+            Self::TextureDerivative => write!(f, "derivative of a texture coordinate, per sigma"),
+            Self::Face => write!(f, "the corners of faces"),
             Self::Unused(reason) => write!(f, "not used ({reason})"),
         }
     }

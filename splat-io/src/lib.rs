@@ -11,10 +11,12 @@ pub mod camera_json;
 pub mod error;
 pub mod exr_file;
 pub mod import;
+pub mod mesh;
 pub mod metadata;
 pub mod picture;
 pub mod ply;
 pub mod png_file;
+mod source;
 pub mod srgb;
 
 pub use atomic::AtomicFile;
@@ -22,7 +24,10 @@ pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
+pub use mesh::{Mesh, MeshImport, Sampled, read_obj, sample_surface};
 pub use metadata::Metadata;
 pub use picture::{PictureFormat, write_picture};
-pub use ply::{PlyEncoding, read_ply, read_ply_from, write_ply};
+pub use ply::{
+    PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
+};
 pub use png_file::write_png;

@@ -13,12 +13,14 @@
 //! | size | `radius`, `psz`, `size`, `pscale`, `scale` | sigma, in scene units; 0 is unknown |
 //! | area | `area` | surface area that the splat stands for, in squared scene units |
 //! | tangents | `tu_x tu_y tu_z tv_x tv_y tv_z` | sigma-scaled axes of an ellipse; they win over a size |
+//! | texture coordinates | `s t`, `u v`, `texture_u texture_v`, .. | at the centre; 1 is the whole texture, t upwards |
+//! | their derivatives | `ds_du dt_du ds_dv dt_dv` | along the two axes, per sigma; absent or zero: unknown |
 //!
 //! Integer colors are sRGB: `uchar` and `ushort` over their type's range, `char` as if it were `uchar`, other
 //! types as 8-bit levels, clamped to 0 to 255.
 //!
-//! Everything else (`confidence`, `quality`, `intensity`, texture coordinates, faces) is reported as not
-//! used. Two comments that [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a
+//! Everything else (`confidence`, `quality`, `intensity`, faces) is reported as not used. ([`crate::read_ply_mesh`]
+//! reads the faces, too.) Two comments that [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a
 //! file are oriented unless it says 0) and `comment splat origin X Y Z` (the cloud's origin, used if it keeps
 //! every position exactly).
 //!
@@ -28,10 +30,10 @@
 mod ascii;
 mod binary;
 mod columns;
+mod faces;
 mod header;
 mod roles;
 mod scalar;
-mod source;
 #[cfg(test)]
 mod tests;
 mod tone;
@@ -39,10 +41,12 @@ mod writer;
 
 pub use writer::{PlyEncoding, write_ply};
 
+use crate::mesh::MeshImport;
+use crate::source::Source;
 use crate::{ElementReport, Error, Import, ImportReport, PropertyReport, Usage};
-use columns::Columns;
+use columns::{Columns, Outcome};
+use faces::Faces;
 use header::{Element, Format, Header};
-use source::Source;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -58,12 +62,18 @@ use std::path::Path;
 /// can hold; [`Error::Limit`] for a header of more than 1 MiB, 2^32 - 1 points or more, or more points than
 /// memory.
 pub fn read_ply(path: &Path) -> Result<Import, Error> {
+    let (file, size) = open(path)?;
+    read_ply_from(file, size, path)
+}
+
+/// Opens a regular file and gives its size, in bytes.
+pub(crate) fn open(path: &Path) -> Result<(File, u64), Error> {
     let file = File::open(path).map_err(Error::io(path, "open"))?;
     let metadata = file.metadata().map_err(Error::io(path, "read"))?;
     if !metadata.is_file() {
         return Err(Error::unsupported(path, "reading a folder, device or pipe", "a regular file"));
     }
-    read_ply_from(file, metadata.len(), path)
+    Ok((file, metadata.len()))
 }
 
 /// Reads a cloud from the `size` bytes of a PLY file that `reader` yields; `path` is its name in messages.
@@ -75,20 +85,13 @@ pub fn read_ply(path: &Path) -> Result<Import, Error> {
 pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import, Error> {
     let mut source = Source::new(reader, size, path);
     let header = Header::read(&mut source)?;
-    let points = header.points(path)?;
-    header.check_claims(points, &source)?;
-
-    let element = &header.elements[points];
-    let mut columns = Columns::new(element, path)?;
-    match header.format {
-        Format::Ascii => ascii::read(&mut source, &header, points, &mut columns)?,
-        Format::BinaryLittleEndian => binary::read::<_, false>(&mut source, &header, points, &mut columns)?,
-        Format::BinaryBigEndian => binary::read::<_, true>(&mut source, &header, points, &mut columns)?,
-    }
+    let mut tables = Tables::new(&header, false, &source)?;
+    tables.read(&header, &mut source)?;
+    let points = tables.points;
     let (sha256, bytes) = source.finish()?;
 
-    let outcome = columns.finish(&header);
-    let mut assumptions = outcome.assumptions;
+    let Outcome { cloud, usages, mut assumptions, color_assumptions } = tables.columns.finish(&header);
+    assumptions.extend(color_assumptions);
     for (index, other) in header.elements.iter().enumerate().filter(|(_, other)| other.count > 0) {
         if index != points {
             let (name, rows) = (&other.name, other.count);
@@ -96,8 +99,7 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
         }
     }
     let elements = header.elements.iter().enumerate();
-    let elements =
-        elements.map(|(index, element)| report(element, (index == points).then_some(&outcome.usages)));
+    let elements = elements.map(|(index, element)| report(element, (index == points).then_some(&usages)));
     let report = ImportReport {
         path: path.to_owned(),
         format: format!("PLY, {}", header.format.describe()),
@@ -106,7 +108,105 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
         elements: elements.collect(),
         assumptions,
     };
-    Ok(Import { cloud: outcome.cloud, report })
+    Ok(Import { cloud, report })
+}
+
+/// Whether the header of a PLY file claims faces that [`read_ply_mesh`] would read.
+///
+/// # Errors
+/// As [`read_ply`], as far as the header goes.
+pub fn ply_has_faces(path: &Path) -> Result<bool, Error> {
+    let (file, size) = open(path)?;
+    let header = Header::read(&mut Source::new(file, size, path))?;
+    Ok(Faces::find(&header).is_some_and(|index| header.elements[index].count > 0))
+}
+
+/// Reads a mesh from a PLY file: the vertices as [`read_ply`] does, and the faces between them.
+///
+/// Faces are the list `vertex_indices` (or `vertex_index`) of an element `face`; one of more than three corners becomes
+/// a fan of triangles. Texture coordinates are those of the vertices or, where the faces have one, the list `texcoord`:
+/// s and t of each corner in turn. Sizes, opacities, areas and tangents of vertices say nothing about a mesh.
+///
+/// # Errors
+/// As [`read_ply`]; [`Error::Invalid`] for a file without faces, and for a face with a vertex that is not there.
+pub fn read_ply_mesh(path: &Path) -> Result<MeshImport, Error> {
+    let (file, size) = open(path)?;
+    read_ply_mesh_from(file, size, path)
+}
+
+/// Reads a mesh from the `size` bytes of a PLY file that `reader` yields; `path` is its name in messages.
+///
+/// # Errors
+/// As [`read_ply_mesh`].
+pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<MeshImport, Error> {
+    let mut source = Source::new(reader, size, path);
+    let header = Header::read(&mut source)?;
+    let mut tables = Tables::new(&header, true, &source)?;
+    tables.read(&header, &mut source)?;
+    let (sha256, bytes) = source.finish()?;
+
+    let points = tables.points;
+    let Outcome { cloud, usages, color_assumptions, .. } = tables.columns.finish(&header);
+    let Some((faces_index, faces)) = tables.faces else {
+        return Err(Faces::missing(path));
+    };
+    let elements = header.elements.iter().enumerate().map(|(index, element)| match index {
+        _ if index == points => report(element, Some(&usages)),
+        _ if index == faces_index => report(element, Some(&faces.usages)),
+        _ => report(element, None),
+    });
+    let elements = elements
+        .map(|element| ElementReport { is_points: element.name == header.elements[points].name, ..element });
+    let report = ImportReport {
+        path: path.to_owned(),
+        format: format!("PLY, {}", header.format.describe()),
+        bytes,
+        sha256,
+        elements: elements.collect(),
+        assumptions: color_assumptions,
+    };
+    Ok(MeshImport { mesh: faces.into_mesh(&cloud), report })
+}
+
+/// The tables of a file that are read; others are skipped.
+struct Tables {
+    /// Index of the table of points.
+    points: usize,
+    columns: Columns,
+    /// The table of faces, with its index, if faces are wanted.
+    faces: Option<(usize, Faces)>,
+}
+
+impl Tables {
+    /// Finds the tables and holds what they claim against the file's size.
+    fn new<R: Read>(header: &Header, with_faces: bool, source: &Source<R>) -> Result<Self, Error> {
+        let points = header.points(source.path())?;
+        let faces = if with_faces { Faces::find(header) } else { None };
+        header.check_claims(points, faces.map_or(points, |faces| faces.max(points)), source)?;
+        let vertices = header.elements[points].count;
+        let columns = Columns::new(&header.elements[points], source.path())?;
+        let faces = faces.map(|index| (index, Faces::new(&header.elements[index], vertices)));
+        Ok(Self { points, columns, faces })
+    }
+
+    /// Reads them, up to the last one.
+    fn read<R: Read>(&mut self, header: &Header, source: &mut Source<R>) -> Result<(), Error> {
+        match header.format {
+            Format::Ascii => ascii::read(source, header, self),
+            Format::BinaryLittleEndian => binary::read::<_, false>(source, header, self),
+            Format::BinaryBigEndian => binary::read::<_, true>(source, header, self),
+        }
+    }
+
+    /// The number of tables from the first one to the last that is read.
+    fn end(&self) -> usize {
+        self.faces.as_ref().map_or(self.points, |(index, _)| self.points.max(*index)) + 1
+    }
+
+    /// The faces, if they are the table of this index.
+    fn faces_at(&mut self, index: usize) -> Option<&mut Faces> {
+        self.faces.as_mut().filter(|(faces, _)| *faces == index).map(|(_, faces)| faces)
+    }
 }
 
 /// What is said of an element; `usages`, one a property, if it is the table of points.

@@ -68,6 +68,7 @@ pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
         colors: cloud.colors.as_ref().map(|values| pick(values, order)),
         opacities: cloud.opacities.as_ref().map(|values| pick(values, order)),
         areas: cloud.areas.as_ref().map(|values| pick(values, order)),
+        texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
         oriented: cloud.oriented,
     }
 }

@@ -465,3 +465,25 @@ pub const LEVEL_SWITCH: f64 = 2.0;
 /// The variance of a lookup of a parabola against the kernel's, relative: sums over texels stand for the integral, which
 /// is off by a few percent where the kernel is 1.25 to 3 texels wide, and the level's own variance is a mean over phases.
 pub const LOOKUP_VARIANCE: f64 = 0.05;
+
+/// The sum of a mesh's surfels' areas, and their axes, relative: all are rounded to f32 once, by up to 2^-24, or twice in
+/// a product of two. Measured: 1.5e-7.
+pub const SAMPLED_AREA: f64 = 4.0 / 16_777_216.0;
+
+/// A surfel's place from its texture coordinates, in scene units: positions of up to 4, axes and coordinates in f32, and
+/// the inverse of a map whose area is a tenth or more of its sides' squares (below 8): some ten roundings of 4 * 2^-24,
+/// enlarged twentyfold. Measured: below 1e-5.
+pub const INTERPOLATED: f64 = 10.0 * 4.0 * 20.0 / 16_777_216.0;
+
+/// The nearest other surfel on an evenly sampled mesh, in spacings (the square root of the area of one): least, and mean.
+/// The densest packing has 1.07, random points 0.50 in the mean and 0.01 as the least. Measured: 0.71 and 0.83.
+pub const EVEN_SPACING: [f64; 2] = [0.65, 0.8];
+
+/// The standard deviation of the distance to the nearest other surfel, over its mean. Random points have 0.52. Measured:
+/// 0.090.
+pub const SPACING_SCATTER: f64 = 0.12;
+
+/// Surfels on a part of a mesh's surface against its share, for 1000 expected on a side of a cube (250 in its middle):
+/// 4 * 1000 random candidates have a standard deviation of 1.6 % (3.2 %), of which the elimination evens out a part.
+/// Measured: 1.8 %.
+pub const EVEN_SHARE: f64 = 0.05;

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use splat_core::fit::{Framing, Up, fit};
 use splat_core::prepare::{PrepareOptions, prepare};
-use splat_core::{Camera, RenderOptions, Shading, render};
+use splat_core::{Camera, Cloud, RenderOptions, Shading, render};
 use splat_tests::tolerances::INTERIOR_HOLES;
 use std::path::PathBuf;
 
@@ -91,7 +91,25 @@ fn interior(covered: &[bool], width: usize) -> Vec<bool> {
 /// The share of a mesh's interior pixels in which its surfels, rendered without any option, leave alpha below .99.
 fn holes(surfels: &str, mesh: &str) -> Option<f64> {
     let data = real_files()?;
-    let mut cloud = splat_io::read_ply(&data.join("surfels").join(surfels)).unwrap().cloud;
+    let cloud = splat_io::read_ply(&data.join("surfels").join(surfels)).unwrap().cloud;
+    let mesh = triangles(&std::fs::read(data.join("meshes").join(mesh)).unwrap());
+    Some(share_of_holes(surfels, cloud, &mesh))
+}
+
+/// The same for surfels that are sampled from the mesh.
+fn holes_of_samples(mesh: &str, count: usize) -> Option<f64> {
+    let path = real_files()?.join("meshes").join(mesh);
+    let is_obj = mesh.ends_with(".obj");
+    let import = if is_obj { splat_io::read_obj(&path) } else { splat_io::read_ply_mesh(&path) };
+    let mesh_read = import.unwrap().mesh;
+    let cloud = splat_io::sample_surface(&mesh_read, count, 0, &mut |_| {}).unwrap().cloud;
+    let triangles: Vec<_> =
+        (0..mesh_read.triangles.len()).map(|triangle| mesh_read.corners(triangle)).collect();
+    Some(share_of_holes(&format!("{count} surfels on {mesh}"), cloud, &triangles))
+}
+
+/// The share of a mesh's interior pixels in which this cloud leaves alpha below .99.
+fn share_of_holes(name: &str, mut cloud: Cloud, mesh: &[[DVec3; 3]]) -> f64 {
     let options = RenderOptions { shading: Shading::Headlight, ..RenderOptions::default() };
     prepare(
         &mut cloud,
@@ -101,17 +119,16 @@ fn holes(surfels: &str, mesh: &str) -> Option<f64> {
         Framing { width: 1280, height: 960, up: Up::Y, azimuth: 30.0, elevation: 20.0, orthographic: false };
     let camera = fit(&cloud, &framing, &options).unwrap();
     let film = render(&cloud, &camera, &options, &mut |_| {}).unwrap().film;
-    let mesh = triangles(&std::fs::read(data.join("meshes").join(mesh)).unwrap());
-    let inside = interior(&covered(&mesh, &camera), 1280);
+    let inside = interior(&covered(mesh, &camera), 1280);
     let total = inside.iter().filter(|&&inside| inside).count();
     let open = inside.iter().zip(&film.rgba).filter(|(inside, rgba)| **inside && rgba[3] < 0.99).count();
     assert!(total > 100_000, "{total} interior pixels");
     let share = open as f64 / total as f64;
     #[expect(clippy::print_stdout, reason = "the measured figure, for --nocapture")]
     {
-        println!("{surfels}: {open} of {total} interior pixels below alpha .99: {:.4} %", 100.0 * share);
+        println!("{name}: {open} of {total} interior pixels below alpha .99: {:.4} %", 100.0 * share);
     }
-    Some(share)
+    share
 }
 
 #[test]
@@ -125,5 +142,18 @@ fn the_dragon_has_no_holes() {
 fn the_bunny_has_no_holes() {
     if let Some(share) = holes("bunny_npm_surfels.ply", "bunny_npm.ply") {
         assert!(share <= INTERIOR_HOLES, "{share}");
+    }
+}
+
+#[test]
+fn sampled_meshes_have_no_holes() {
+    for (mesh, count) in [
+        ("spot/spot_triangulated.obj", 200_000),
+        ("spot/spot_triangulated.obj", 20_000),
+        ("dragon_vrip_res3.ply", 200_000),
+    ] {
+        if let Some(share) = holes_of_samples(mesh, count) {
+            assert!(share <= INTERIOR_HOLES, "{mesh}: {share}");
+        }
     }
 }

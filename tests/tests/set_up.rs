@@ -492,6 +492,7 @@ fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
         colors: cloud.colors.as_ref().map(|values| by(values, order)),
         opacities: cloud.opacities.as_ref().map(|values| by(values, order)),
         areas: cloud.areas.as_ref().map(|values| by(values, order)),
+        texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| by(values, order)),
         ..cloud.clone()
     }
 }

@@ -32,6 +32,7 @@ pub struct Summary {
     /// Least and greatest.
     opacities: Option<[f32; 2]>,
     areas: bool,
+    texture_coordinates: bool,
     sizes: Sizes,
     assumptions: Vec<String>,
 }
@@ -118,6 +119,7 @@ impl Summary {
             colors: cloud.colors.is_some(),
             opacities: cloud.opacities.as_deref().and_then(range),
             areas: cloud.areas.is_some(),
+            texture_coordinates: cloud.texture_coordinates.is_some(),
             sizes: sizes(&cloud),
             dropped: dropped(&mut cloud),
             assumptions,
@@ -211,6 +213,7 @@ impl fmt::Display for Summary {
             Some([low, high]) => writeln!(f, "opacities    {low} to {high}")?,
         }
         writeln!(f, "areas        {}", presence(self.areas))?;
+        writeln!(f, "texture      {}", presence(self.texture_coordinates))?;
         let Sizes { shape, known, unknown, range } = &self.sizes;
         writeln!(f, "sizes        {shape}: {known} known, {unknown} unknown")?;
         if let Some([low, mean, high]) = range {

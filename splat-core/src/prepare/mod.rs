@@ -70,10 +70,16 @@ pub fn prepare(cloud: &mut Cloud, options: &PrepareOptions) -> Estimated {
     estimated
 }
 
-/// Multiplies every size.
+/// Multiplies every size, and with it what a texture changes by per sigma.
 fn scale_sizes(cloud: &mut Cloud, scale: f32) {
+    if scale == 1.0 {
+        return;
+    }
+    for coordinates in cloud.texture_coordinates.iter_mut().flatten() {
+        coordinates.per_u *= scale;
+        coordinates.per_v *= scale;
+    }
     match &mut cloud.shapes {
-        _ if scale == 1.0 => {}
         Shapes::Discs(sizes) => sizes.iter_mut().for_each(|size| *size *= scale),
         Shapes::Ellipses(axes) => axes.iter_mut().flatten().for_each(|axis| *axis *= scale),
     }
@@ -82,7 +88,8 @@ fn scale_sizes(cloud: &mut Cloud, scale: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, Vec3};
+    use crate::TextureCoordinates;
+    use glam::{DVec3, Vec2, Vec3};
 
     const OPTIONS: PrepareOptions =
         PrepareOptions { kernel: Kernel::Windowed, cutoff: 4.0, areas: true, size_scale: 1.0 };
@@ -139,5 +146,18 @@ mod tests {
         let mut coincident = Cloud::from_points(&[DVec3::ONE; 20]);
         prepare(&mut coincident, &OPTIONS);
         assert!((0..20).all(|i| coincident.defect(i).is_none()), "{coincident:?}");
+    }
+
+    #[test]
+    fn a_splat_that_grows_carries_more_of_its_texture() {
+        let mut cloud = grid(3, 1.0);
+        cloud.shapes = Shapes::Ellipses(vec![[Vec3::X, Vec3::Y]; 9]);
+        let given =
+            TextureCoordinates { center: Vec2::splat(0.5), per_u: Vec2::X, per_v: Vec2::new(2.0, 3.0) };
+        cloud.texture_coordinates = Some(vec![given; 9]);
+        prepare(&mut cloud, &PrepareOptions { size_scale: 0.5, ..OPTIONS });
+        let halved = TextureCoordinates { per_u: 0.5 * given.per_u, per_v: 0.5 * given.per_v, ..given };
+        assert_eq!(cloud.texture_coordinates, Some(vec![halved; 9]));
+        assert_eq!(cloud.shapes, Shapes::Ellipses(vec![[0.5 * Vec3::X, 0.5 * Vec3::Y]; 9]));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{CameraSplat, Dropped, View, camera_splat, count_dropped, from_eye, shows_back};
 use crate::{Cloud, RenderOptions, Shapes};
-use glam::{Vec3, Vec3Swizzles};
+use glam::Vec3Swizzles;
 use std::cmp::Ordering;
 use std::ops::Range;
 
@@ -99,12 +99,16 @@ fn compare_data(cloud: &Cloud, a: usize, b: usize) -> Ordering {
         .then_with(|| cloud.colors.as_ref().map_or(Ordering::Equal, |c| compare(c[a], c[b])))
         .then_with(|| cloud.opacities.as_ref().map_or(Ordering::Equal, |o| o[a].total_cmp(&o[b])))
         .then_with(|| cloud.areas.as_ref().map_or(Ordering::Equal, |s| s[a].total_cmp(&s[b])))
+        .then_with(|| {
+            let coordinates = cloud.texture_coordinates.as_ref();
+            coordinates.map_or(Ordering::Equal, |c| compare(c[a].to_array(), c[b].to_array()))
+        })
         // Equal in everything: interchangeable in the picture, told apart only by the id.
         .then(a.cmp(&b))
 }
 
 /// A total order of vectors, component by component.
-fn compare(a: Vec3, b: Vec3) -> Ordering {
-    let pairs = a.to_array().into_iter().zip(b.to_array());
+fn compare<const N: usize>(a: impl Into<[f32; N]>, b: impl Into<[f32; N]>) -> Ordering {
+    let pairs = a.into().into_iter().zip(b.into());
     pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }

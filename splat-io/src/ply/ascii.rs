@@ -1,53 +1,34 @@
 //! Tables as text: a row a line, numbers between blanks.
 
+use super::Tables;
 use super::columns::Columns;
+use super::faces::{Faces, List};
 use super::header::{Element, Header, Kind};
 use super::roles::{Row, SLOTS};
 use super::scalar::Scalar;
-use super::source::Source;
 use crate::error::quoted;
+use crate::source::Source;
 use crate::{Error, Place};
 use std::io::Read;
 
 /// Greatest length of a number, in bytes: more than the longest exact `f64` needs.
 const MOST_WORD_BYTES: usize = 1100;
 
-/// Reads the tables up to the one of points into its columns; what follows is left alone.
+/// Reads the tables that are wanted; what follows the last of them is left alone.
 pub(super) fn read<R: Read>(
     source: &mut Source<R>,
     header: &Header,
-    points: usize,
-    columns: &mut Columns,
+    tables: &mut Tables,
 ) -> Result<(), Error> {
     let mut text = Text { source, line: header.next_line };
-    for element in &header.elements[..points] {
-        if !element.properties.is_empty() {
+    for (index, element) in header.elements[..tables.end()].iter().enumerate() {
+        if index == tables.points {
+            text.read_points(element, &mut tables.columns)?;
+        } else if let Some(faces) = tables.faces_at(index) {
+            text.read_faces(element, faces)?;
+        } else if !element.properties.is_empty() {
             text.skip_rows(element)?;
         }
-    }
-    let element = &header.elements[points];
-    let mut values: Row = [0.0; SLOTS];
-    for row in 0..columns.count() as u64 {
-        text.start_row(element, row)?;
-        for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
-            let name = &property.name;
-            match (property.kind, *slot) {
-                (Kind::Scalar(kind), Some(slot)) => values[slot] = text.number(kind, element, row, name)?,
-                (Kind::Scalar(_), None) => text.skip_word(element, row, name)?,
-                (Kind::List { count, .. }, _) => {
-                    let length = text.number(count, element, row, name)?;
-                    if length < 0.0 {
-                        let found = format!("a list of {length} entries");
-                        return Err(text.invalid(found, format!("0 or more in property {name} of row {row}")));
-                    }
-                    for _ in 0..length as u64 {
-                        text.skip_word(element, row, name)?;
-                    }
-                }
-            }
-        }
-        text.end_row(element, row)?;
-        columns.push(&values);
     }
     Ok(())
 }
@@ -68,6 +49,67 @@ fn is_line_end(byte: u8) -> bool {
 }
 
 impl<R: Read> Text<'_, R> {
+    /// Reads the table of points.
+    fn read_points(&mut self, element: &Element, columns: &mut Columns) -> Result<(), Error> {
+        let mut values: Row = [0.0; SLOTS];
+        for row in 0..columns.count() as u64 {
+            self.start_row(element, row)?;
+            for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+                let name = &property.name;
+                match (property.kind, *slot) {
+                    (Kind::Scalar(kind), Some(slot)) => {
+                        values[slot] = self.number(kind, element, row, name)?;
+                    }
+                    (Kind::Scalar(_), None) => self.skip_word(element, row, name)?,
+                    (Kind::List { count, .. }, _) => {
+                        for _ in 0..self.list_length(count, element, row, name)? {
+                            self.skip_word(element, row, name)?;
+                        }
+                    }
+                }
+            }
+            self.end_row(element, row)?;
+            columns.push(&values);
+        }
+        Ok(())
+    }
+
+    /// Reads the table of faces.
+    fn read_faces(&mut self, element: &Element, faces: &mut Faces) -> Result<(), Error> {
+        for row in 0..element.count {
+            self.start_row(element, row)?;
+            faces.start_row();
+            for (index, property) in element.properties.iter().enumerate() {
+                let name = &property.name;
+                match (property.kind, faces.list(index)) {
+                    (Kind::Scalar(_), _) => self.skip_word(element, row, name)?,
+                    (Kind::List { count, item }, list) => {
+                        for _ in 0..self.list_length(count, element, row, name)? {
+                            match list {
+                                List::Skipped => self.skip_word(element, row, name)?,
+                                _ => faces.value(list, self.number(item, element, row, name)?),
+                            }
+                        }
+                    }
+                }
+            }
+            let place = Place::Line(self.line);
+            self.end_row(element, row)?;
+            faces.end_row(self.source.path(), || place)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the length of a list.
+    fn list_length(&mut self, count: Scalar, element: &Element, row: u64, name: &str) -> Result<u64, Error> {
+        let length = self.number(count, element, row, name)?;
+        if length < 0.0 {
+            let found = format!("a list of {length} entries");
+            return Err(self.invalid(found, format!("0 or more in property {name} of row {row}")));
+        }
+        Ok(length as u64)
+    }
+
     /// Goes to the next word of the line and gives its length, or `None` at the end of the line or file. The
     /// word is then at the front of the window.
     #[inline]

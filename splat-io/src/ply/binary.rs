@@ -1,29 +1,33 @@
 //! Tables in binary, either endian.
 
+use super::Tables;
 use super::columns::Columns;
+use super::faces::{Faces, List};
 use super::header::{Element, Header, Kind};
 use super::roles::{Row, SLOTS};
 use super::scalar::Scalar;
-use super::source::Source;
+use crate::source::Source;
 use crate::{Error, Place};
 use std::io::Read;
 
-/// Reads the tables up to the one of points into its columns; what follows is left alone.
+/// Reads the tables that are wanted; what follows the last of them is left alone.
 pub(super) fn read<R: Read, const BIG: bool>(
     source: &mut Source<R>,
     header: &Header,
-    points: usize,
-    columns: &mut Columns,
+    tables: &mut Tables,
 ) -> Result<(), Error> {
-    for element in &header.elements[..points] {
-        skip::<R, BIG>(source, element)?;
+    for (index, element) in header.elements[..tables.end()].iter().enumerate() {
+        if index == tables.points && element.is_fixed() {
+            read_fixed::<R, BIG>(source, element, &mut tables.columns)?;
+        } else if index == tables.points {
+            read_varying::<R, BIG>(source, element, &mut tables.columns)?;
+        } else if let Some(faces) = tables.faces_at(index) {
+            read_faces::<R, BIG>(source, element, faces)?;
+        } else {
+            skip::<R, BIG>(source, element)?;
+        }
     }
-    let element = &header.elements[points];
-    if element.is_fixed() {
-        read_fixed::<R, BIG>(source, element, columns)
-    } else {
-        read_varying::<R, BIG>(source, element, columns)
-    }
+    Ok(())
 }
 
 /// Reads rows that all have the same size: whole windows at a time.
@@ -86,6 +90,33 @@ fn read_varying<R: Read, const BIG: bool>(
     Ok(())
 }
 
+/// Reads the table of faces.
+fn read_faces<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    element: &Element,
+    faces: &mut Faces,
+) -> Result<(), Error> {
+    for row in 0..element.count {
+        let byte = source.offset();
+        faces.start_row();
+        for (index, property) in element.properties.iter().enumerate() {
+            match (property.kind, faces.list(index)) {
+                (Kind::Scalar(kind), _) => _ = scalar::<R, BIG>(source, kind, element, row)?,
+                (Kind::List { count, item }, List::Skipped) => {
+                    skip_list::<R, BIG>(source, count, item, element, row)?;
+                }
+                (Kind::List { count, item }, list) => {
+                    for _ in 0..list_length::<R, BIG>(source, count, item, element, row)? {
+                        faces.value(list, scalar::<R, BIG>(source, item, element, row)?);
+                    }
+                }
+            }
+        }
+        faces.end_row(source.path(), || Place::Row { element: element.name.clone(), row, byte })?;
+    }
+    Ok(())
+}
+
 /// Skips a table.
 fn skip<R: Read, const BIG: bool>(source: &mut Source<R>, element: &Element) -> Result<(), Error> {
     if element.is_fixed() {
@@ -126,6 +157,18 @@ fn skip_list<R: Read, const BIG: bool>(
     element: &Element,
     row: u64,
 ) -> Result<(), Error> {
+    let length = list_length::<R, BIG>(source, count, item, element, row)?;
+    if source.skip(length * item.bytes() as u64)? { Ok(()) } else { Err(cut_off(source, element, row)) }
+}
+
+/// Reads the length of a list, and holds it against what the file has left.
+fn list_length<R: Read, const BIG: bool>(
+    source: &mut Source<R>,
+    count: Scalar,
+    item: Scalar,
+    element: &Element,
+    row: u64,
+) -> Result<u64, Error> {
     let byte = source.offset();
     let length = scalar::<R, BIG>(source, count, element, row)?;
     let most = source.left() / item.bytes() as u64;
@@ -139,11 +182,7 @@ fn skip_list<R: Read, const BIG: bool>(
             format!("0 to {most}, what the file has left"),
         ));
     }
-    if source.skip(length as u64 * item.bytes() as u64)? {
-        Ok(())
-    } else {
-        Err(cut_off(source, element, row))
-    }
+    Ok(length as u64)
 }
 
 /// The file ends in a row.

@@ -1,12 +1,14 @@
 //! From the rows of a table of points to a cloud.
 
 use super::header::{Element, Header};
-use super::roles::{AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, Row, SIZE, TANGENTS};
+use super::roles::{
+    AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, Row, SIZE, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
+};
 use super::scalar::Scalar;
 use super::tone::Tone;
 use crate::{Error, Usage};
-use glam::{DVec3, Vec3};
-use splat_core::{Cloud, Shapes};
+use glam::{DVec3, Vec2, Vec3};
+use splat_core::{Cloud, Shapes, TextureCoordinates};
 use std::collections::TryReserveError;
 use std::path::Path;
 
@@ -26,6 +28,7 @@ pub(super) struct Columns {
     sizes: Option<Vec<f32>>,
     areas: Option<Vec<f32>>,
     tangents: Option<Vec<[Vec3; 2]>>,
+    texture_coordinates: Option<Vec<TextureCoordinates>>,
 }
 
 /// What became of the columns.
@@ -33,7 +36,10 @@ pub(super) struct Outcome {
     pub cloud: Cloud,
     /// Per property of the element.
     pub usages: Vec<Usage>,
+    /// Of places, normals, sizes and texture coordinates.
     pub assumptions: Vec<String>,
+    /// Of colours and opacities.
+    pub color_assumptions: Vec<String>,
 }
 
 impl Columns {
@@ -63,6 +69,7 @@ impl Columns {
             sizes: kinds[SIZE].map(|_| Vec::new()),
             areas: kinds[AREA].map(|_| Vec::new()),
             tangents: kinds[TANGENTS.start].map(|_| Vec::new()),
+            texture_coordinates: kinds[TEXTURE.start].map(|_| Vec::new()),
             roles,
         }
     }
@@ -78,7 +85,8 @@ impl Columns {
         room(&mut self.opacities, self.count)?;
         room(&mut self.sizes, self.count)?;
         room(&mut self.areas, self.count)?;
-        room(&mut self.tangents, self.count)
+        room(&mut self.tangents, self.count)?;
+        room(&mut self.texture_coordinates, self.count)
     }
 
     /// Number of rows that were claimed.
@@ -118,6 +126,11 @@ impl Columns {
             let [u, v] = [TANGENTS.start, TANGENTS.start + 3].map(triple);
             tangents.push([u.as_vec3(), v.as_vec3()]);
         }
+        if let Some(coordinates) = &mut self.texture_coordinates {
+            let pair = |slot: usize| Vec2::new(row[slot] as f32, row[slot + 1] as f32);
+            let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
+            coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
+        }
     }
 
     /// Makes the cloud and says what was assumed.
@@ -145,7 +158,12 @@ impl Columns {
             }
             (None, None) => "no size: every size is unknown".to_owned(),
         });
-        self.describe_colors(&mut assumptions);
+        let mut color_assumptions = Vec::new();
+        self.describe_colors(&mut color_assumptions);
+        if self.texture_coordinates.is_some() && self.roles.kinds[TEXTURE_DERIVATIVES.start].is_none() {
+            let name = "texture coordinates are those of the splats' centres: their derivatives are unknown";
+            assumptions.push(name.to_owned());
+        }
 
         cloud.shapes = match (self.tangents, self.sizes) {
             (Some(tangents), _) => Shapes::Ellipses(tangents),
@@ -156,7 +174,8 @@ impl Columns {
         cloud.colors = self.colors;
         cloud.opacities = self.opacities;
         cloud.areas = self.areas;
-        Outcome { cloud, usages: self.roles.usages, assumptions }
+        cloud.texture_coordinates = self.texture_coordinates;
+        Outcome { cloud, usages: self.roles.usages, assumptions, color_assumptions }
     }
 
     fn drop_zero_normals(&mut self, assumptions: &mut Vec<String>) {

@@ -3,8 +3,8 @@
 mod reader;
 
 use super::scalar::Scalar;
-use super::source::Source;
 use crate::error::quoted;
+use crate::source::Source;
 use crate::{Error, Place};
 use glam::DVec3;
 use std::io::Read;
@@ -108,8 +108,8 @@ impl Header {
         })
     }
 
-    /// Holds what the tables up to the one of points claim against what the file has.
-    pub fn check_claims<R: Read>(&self, points: usize, source: &Source<R>) -> Result<(), Error> {
+    /// Holds what the tables up to the last one to be read claim against what the file has.
+    pub fn check_claims<R: Read>(&self, points: usize, last: usize, source: &Source<R>) -> Result<(), Error> {
         if self.elements[points].count >= u64::from(u32::MAX) {
             let what = format!("a cloud of {} points", self.elements[points].count);
             return Err(Error::limit(source.path(), what, format!("{} points", u32::MAX - 1)));
@@ -117,7 +117,7 @@ impl Header {
         let mut left = u128::from(source.left());
         // The last number of an ASCII file may lack the blank behind it.
         let lacking = u128::from(self.format == Format::Ascii);
-        for element in &self.elements[..=points] {
+        for element in &self.elements[..=last] {
             let row = match self.format {
                 Format::Ascii => 2 * element.properties.len(),
                 _ => element.least_bytes(),

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 
 /// Number of values of a row that can be of use.
-pub(super) const SLOTS: usize = 18;
+pub(super) const SLOTS: usize = 24;
 
 /// The values of a row: a slot each, by meaning.
 pub(super) type Row = [f64; SLOTS];
@@ -19,6 +19,8 @@ pub(super) const OPACITY: usize = 9;
 pub(super) const SIZE: usize = 10;
 pub(super) const AREA: usize = 11;
 pub(super) const TANGENTS: Range<usize> = 12..18;
+pub(super) const TEXTURE: Range<usize> = 18..20;
+pub(super) const TEXTURE_DERIVATIVES: Range<usize> = 20..24;
 
 /// The names of each slot; the first name that is present counts.
 const NAMES: [&[&str]; SLOTS] = [
@@ -40,10 +42,16 @@ const NAMES: [&[&str]; SLOTS] = [
     &["tv_x"],
     &["tv_y"],
     &["tv_z"],
+    &["s", "u", "texture_u", "texture_s", "texcoord_u"],
+    &["t", "v", "texture_v", "texture_t", "texcoord_v"],
+    &["ds_du"],
+    &["dt_du"],
+    &["ds_dv"],
+    &["dt_dv"],
 ];
 
 /// Slots that are of use only together.
-const GROUPS: [(Range<usize>, Usage); 7] = [
+const GROUPS: [(Range<usize>, Usage); 9] = [
     (POSITION, Usage::Position),
     (NORMAL, Usage::Normal),
     (COLOR, Usage::Color),
@@ -51,6 +59,8 @@ const GROUPS: [(Range<usize>, Usage); 7] = [
     (SIZE..SIZE + 1, Usage::Size),
     (AREA..AREA + 1, Usage::Area),
     (TANGENTS, Usage::Tangent),
+    (TEXTURE, Usage::TextureCoordinate),
+    (TEXTURE_DERIVATIVES, Usage::TextureDerivative),
 ];
 
 /// The meaning of each property.
@@ -89,15 +99,18 @@ impl Roles {
                 (0..properties.len()).find(|index| known(index) && scalar(*index).is_some())
             })
         });
-        let is_elliptical = chosen[TANGENTS].iter().all(Option::is_some);
+        let is_whole = |group: Range<usize>| chosen[group].iter().all(Option::is_some);
+        let (is_elliptical, is_textured) = (is_whole(TANGENTS), is_whole(TEXTURE));
         for (group, usage) in GROUPS {
-            let present = chosen[group.clone()].iter().all(Option::is_some);
+            let present = is_whole(group.clone());
             for slot in group {
                 let Some(index) = chosen[slot] else { continue };
                 if !present {
                     usages[index] = Usage::Unused("the other components are missing");
                 } else if slot == SIZE && is_elliptical {
                     usages[index] = Usage::Unused("the tangent axes give the size");
+                } else if TEXTURE_DERIVATIVES.contains(&slot) && !is_textured {
+                    usages[index] = Usage::Unused("the texture coordinates are missing");
                 } else {
                     usages[index] = usage;
                     slots[index] = Some(slot);

@@ -20,7 +20,8 @@ pub enum PlyEncoding {
 /// Writes a cloud as a PLY file, in one step ([`AtomicFile`]).
 ///
 /// Positions are `double` if the cloud has an origin other than zero, else `float`; all else is `float`: `nx
-/// ny nz`, `radius` (sigma) or `tu_x .. tv_z`, `red green blue` (linear), `opacity`, `area`.
+/// ny nz`, `radius` (sigma) or `tu_x .. tv_z`, `red green blue` (linear), `opacity`, `area`, `s t ds_du dt_du ds_dv
+/// dt_dv`.
 /// [`crate::read_ply`] gives the same cloud, bit for bit, provided that normals are unit vectors, that
 /// opacities lie in [0, 1], and that origin + offset keeps the offsets' bits (as it does in every cloud that
 /// was made from `f64` positions).
@@ -72,6 +73,9 @@ fn write_header(out: &mut impl Write, cloud: &Cloud, encoding: PlyEncoding) -> i
     if cloud.areas.is_some() {
         properties(out, "float", &["area"])?;
     }
+    if cloud.texture_coordinates.is_some() {
+        properties(out, "float", &["s", "t", "ds_du", "dt_du", "ds_dv", "dt_dv"])?;
+    }
     writeln!(out, "end_header")
 }
 
@@ -96,6 +100,9 @@ fn write_rows(out: &mut impl Rows, cloud: &Cloud) -> io::Result<()> {
         }
         for column in [&cloud.opacities, &cloud.areas].into_iter().flatten() {
             out.floats(&[column[index]])?;
+        }
+        if let Some(coordinates) = &cloud.texture_coordinates {
+            out.floats(&coordinates[index].to_array())?;
         }
         out.end()?;
     }

@@ -3,7 +3,7 @@
 use super::{Element, Format, Header, Kind, Property};
 use crate::error::quoted;
 use crate::ply::scalar::Scalar;
-use crate::ply::source::Source;
+use crate::source::Source;
 use crate::{Error, Place};
 use glam::DVec3;
 use std::collections::HashSet;

@@ -1,9 +1,9 @@
 //! What is written reads back as the same cloud.
 
 use super::*;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
-use splat_core::Shapes;
+use splat_core::{Shapes, TextureCoordinates};
 
 /// Everything in a cloud, as bits.
 fn bits(cloud: &Cloud) -> (Vec<u64>, Vec<Option<Vec<u32>>>, bool) {
@@ -20,6 +20,10 @@ fn bits(cloud: &Cloud) -> (Vec<u64>, Vec<Option<Vec<u32>>>, bool) {
         cloud.colors.as_deref().map(vectors),
         cloud.opacities.as_ref().map(scalars),
         cloud.areas.as_ref().map(scalars),
+        cloud
+            .texture_coordinates
+            .as_ref()
+            .map(|all| scalars(&all.iter().flat_map(|c| c.to_array()).collect())),
     ];
     (cloud.origin.to_array().map(f64::to_bits).to_vec(), columns, cloud.oriented)
 }
@@ -51,10 +55,11 @@ prop_compose! {
                 prop::array::uniform3(0.0..1e4_f32),
                 0.0..=1.0_f32,
                 1e-30..1e30_f32,
+                prop::array::uniform6(any::<f32>().prop_filter("finite", |v| v.is_finite())),
             ),
             1..20,
         ),
-        has in prop::array::uniform5(any::<bool>()),
+        has in prop::array::uniform6(any::<bool>()),
         oriented in any::<bool>(),
     ) -> Cloud {
         // Some positions are f32 numbers, far from any origin.
@@ -74,6 +79,13 @@ prop_compose! {
         cloud.colors = has[2].then(|| rows.iter().map(|row| Vec3::from_array(row.3)).collect());
         cloud.opacities = has[3].then(|| rows.iter().map(|row| row.4).collect());
         cloud.areas = has[4].then(|| rows.iter().map(|row| row.5).collect());
+        let pair = |v: &[f32; 6], first: usize| Vec2::new(v[first], v[first + 1]);
+        let coordinates = |v: &[f32; 6]| TextureCoordinates {
+            center: pair(v, 0),
+            per_u: pair(v, 2),
+            per_v: pair(v, 4),
+        };
+        cloud.texture_coordinates = has[5].then(|| rows.iter().map(|row| coordinates(&row.6)).collect());
         cloud
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const BUFFER_BYTES: usize = 256 << 10;
 
 /// The bytes of a file, seen through a sliding window.
-pub(super) struct Source<R> {
+pub(crate) struct Source<R> {
     reader: R,
     path: PathBuf,
     /// What the file system says, in bytes.
