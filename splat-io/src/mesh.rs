@@ -56,9 +56,12 @@ impl Mesh {
     ///
     /// # Errors
     /// [`Error::Length`] for colours or triples that are too few or too many; [`Error::Invalid`] for an index of
-    /// nothing.
+    /// nothing, and for 2^32 - 1 triangles or more.
     pub fn check(&self) -> Result<(), Error> {
         let (positions, triangles) = (self.positions.len(), self.triangles.len());
+        if triangles >= NO_INDEX as usize {
+            return Err(Error::invalid("number of triangles", triangles, "fewer than 2^32 - 1"));
+        }
         let optional = |length: usize| (length > 0).then_some(length);
         let lengths = [
             ("mesh colours", self.colors.as_ref().map(Vec::len), positions),

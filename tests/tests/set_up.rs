@@ -3,13 +3,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec3};
+use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3};
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use splat_core::setup::{
     CameraSplat, Extent, SetUp, View, VisibleSplat, camera_splat, half_depth, orthographic_extent,
     perspective_extent, set_up, sort_keys,
 };
-use splat_core::{Camera, Cloud, Projection, RenderOptions, Shapes, render};
+use splat_core::{Camera, Cloud, Projection, RenderOptions, Shapes, TextureCoordinates, render};
 use splat_tests::brute_force::{self, Disc, Rect};
 use splat_tests::core_scenes::{
     camera_space, discs, ellipses, hard, image_of, lens_of, orthographic, pinhole, random_axes, sample_ray,
@@ -606,6 +606,9 @@ fn every_cause_of_dropping_is_counted() {
         );
         assert_eq!(dropped(&|cloud| cloud.opacities = Some(vec![1.0, bad, 1.0])), not_finite);
         assert_eq!(dropped(&|cloud| cloud.areas = Some(vec![1.0, bad, 1.0])), not_finite);
+        let known = TextureCoordinates::default();
+        let wrong = TextureCoordinates { per_v: Vec2::new(0.0, bad), ..known };
+        assert_eq!(dropped(&|cloud| cloud.texture_coordinates = Some(vec![known, wrong, known])), not_finite);
     }
     assert_eq!(dropped(&|cloud| cloud.normals[1] = Vec3::ZERO), vec![("zero_normal", 1)]);
     let parallel = [[Vec3::X * 0.1, Vec3::Y * 0.1], [Vec3::X, Vec3::X], [Vec3::Y, Vec3::X]];

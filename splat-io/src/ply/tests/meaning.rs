@@ -1,9 +1,9 @@
 //! What the properties mean.
 
 use super::*;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use splat_core::srgb::decode;
-use splat_core::{Defect, Shapes};
+use splat_core::{Defect, Shapes, TextureCoordinates};
 
 /// A file of one vertex for each format: the same values after "float x/y/z" = 1 2 3.
 fn one(properties: &[(&str, f64)]) -> Vec<Import> {
@@ -128,6 +128,35 @@ fn areas_and_tangents() {
     }
     for import in one(&properties[1..]) {
         assert_eq!(import.cloud.shapes, Shapes::Discs(vec![9.0]));
+    }
+}
+
+#[test]
+fn texture_coordinates_have_many_names_and_perhaps_derivatives() {
+    let center = Vec2::new(0.25, -1.5);
+    for [s, t] in [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["S", "T"]] {
+        let names = [s, t].map(|name| format!("float {name}"));
+        for import in one(&[(&names[0], 0.25), (&names[1], -1.5)]) {
+            let expected = TextureCoordinates { center, ..TextureCoordinates::default() };
+            assert_eq!(import.cloud.texture_coordinates, Some(vec![expected]));
+            assert_eq!(usage(&import, t), Usage::TextureCoordinate);
+            assert!(import.report.assumptions.iter().any(|line| line.contains("derivatives are unknown")));
+        }
+    }
+    let derivatives =
+        [("float ds_du", 1.0), ("float dt_du", 2.0), ("double ds_dv", 3.0), ("uchar dt_dv", 4.0)];
+    for import in one(&[&derivatives[..], &[("float s", 0.25), ("float t", -1.5)]].concat()) {
+        let expected = TextureCoordinates { center, per_u: Vec2::new(1.0, 2.0), per_v: Vec2::new(3.0, 4.0) };
+        assert_eq!(import.cloud.texture_coordinates, Some(vec![expected]));
+        assert_eq!(usage(&import, "dt_du"), Usage::TextureDerivative);
+    }
+    for import in one(&derivatives) {
+        assert_eq!(import.cloud.texture_coordinates, None);
+        assert_eq!(usage(&import, "ds_dv"), Usage::Unused("the texture coordinates are missing"));
+    }
+    for import in one(&[("float s", 1.0)]) {
+        assert_eq!(import.cloud.texture_coordinates, None);
+        assert_eq!(usage(&import, "s"), Usage::Unused("the other components are missing"));
     }
 }
 
