@@ -152,11 +152,20 @@ impl Resolver {
     ///
     /// Every fragment must be [admitted](Fragment::is_admitted), and no two may share a rank.
     pub fn resolve(&mut self, fragments: &mut [Fragment], surfaces: &[SplatSurface]) -> SampleColor {
+        self.resolve_with(fragments, |fragment| surfaces[fragment.rank() as usize])
+    }
+
+    /// The same, where `surface_of` gives what a fragment's splat shares among its fragments (of this sample at least).
+    pub fn resolve_with(
+        &mut self,
+        fragments: &mut [Fragment],
+        surface_of: impl Fn(&Fragment) -> SplatSurface,
+    ) -> SampleColor {
         fragments.sort_unstable_by_key(Fragment::rank);
         match self.mode {
             Resolve::Surface { coverage, thickness } => {
-                self.find_layers(fragments, surfaces, thickness);
-                self.sum_layers(fragments, surfaces);
+                self.find_layers(fragments, &surface_of, thickness);
+                self.sum_layers(fragments, &surface_of);
                 self.layers.retain(|layer| coverage.of(layer.weight) > 0.0);
                 self.layers.sort_unstable_by(|a, b| {
                     let nearer = a.nearest.total_cmp(&b.nearest);
@@ -169,7 +178,7 @@ impl Resolver {
                 })
             }
             Resolve::Over => {
-                self.one_layer_each(fragments, surfaces);
+                self.one_layer_each(fragments, &surface_of);
                 self.composite(|layer| (1.0, layer.weight_opacity))
             }
         }
@@ -196,9 +205,14 @@ impl Resolver {
     }
 
     /// Numbers the layers: the connected components, facing by facing, of the graph of overlapping intervals.
-    fn find_layers(&mut self, fragments: &[Fragment], surfaces: &[SplatSurface], thickness: Thickness) {
+    fn find_layers(
+        &mut self,
+        fragments: &[Fragment],
+        surface_of: impl Fn(&Fragment) -> SplatSurface,
+        thickness: Thickness,
+    ) {
         self.intervals.clear();
-        self.intervals.extend(fragments.iter().map(|f| thickness.interval(f, &surfaces[f.rank() as usize])));
+        self.intervals.extend(fragments.iter().map(|f| thickness.interval(f, &surface_of(f))));
         self.order.clear();
         let keys = self.intervals.iter().zip(fragments).enumerate();
         self.order.extend(keys.map(|(i, (&[near, _], fragment))| near_end_key(fragment.is_back(), near, i)));
@@ -224,20 +238,20 @@ impl Resolver {
     }
 
     /// Sums each layer's fragments in splat order, with one accumulator.
-    fn sum_layers(&mut self, fragments: &[Fragment], surfaces: &[SplatSurface]) {
+    fn sum_layers(&mut self, fragments: &[Fragment], surface_of: impl Fn(&Fragment) -> SplatSurface) {
         for (fragment, &number) in fragments.iter().zip(&self.layer_of) {
-            self.layers[number as usize].add(fragment, &surfaces[fragment.rank() as usize]);
+            self.layers[number as usize].add(fragment, &surface_of(fragment));
         }
     }
 
     /// `over`: a layer for each fragment that can be seen, nearest first.
-    fn one_layer_each(&mut self, fragments: &[Fragment], surfaces: &[SplatSurface]) {
+    fn one_layer_each(&mut self, fragments: &[Fragment], surface_of: impl Fn(&Fragment) -> SplatSurface) {
         self.layers.clear();
         self.layer_of.clear();
         self.layer_of.extend(0..fragments.len() as u32);
         for (number, fragment) in fragments.iter().enumerate() {
             let mut layer = Layer::new(number as u32, fragment.is_back());
-            layer.add(fragment, &surfaces[fragment.rank() as usize]);
+            layer.add(fragment, &surface_of(fragment));
             if layer.weight_opacity >= MIN_ALPHA {
                 self.layers.push(layer);
             }

@@ -46,8 +46,11 @@ pub fn options(options: &RenderOptions) -> String {
         }
     };
     let shading = match options.shading {
-        Shading::Color => "color",
-        Shading::Headlight => "headlight",
+        Shading::Color => "color".to_owned(),
+        Shading::Headlight => "headlight".to_owned(),
+        Shading::Lambert { to_light } => {
+            format!("lambert --light {},{},{}", to_light.x, to_light.y, to_light.z)
+        }
     };
     let background = match options.background {
         None => "none".to_owned(),

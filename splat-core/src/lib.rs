@@ -17,6 +17,7 @@ pub mod real;
 pub mod render;
 pub mod sampling;
 pub mod setup;
+pub mod shade;
 pub mod srgb;
 pub mod texture;
 
@@ -28,3 +29,4 @@ pub use kernel::{Kernel, TableMode};
 pub use options::{RenderOptions, Shading};
 pub use render::{Rendered, Statistics, fragments, render};
 pub use sampling::{PatternKind, PixelFilter};
+pub use shade::{Detail, Environment, Material, Optics};

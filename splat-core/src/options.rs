@@ -2,7 +2,9 @@
 
 use crate::kernel::{Kernel, TableMode};
 use crate::sampling::{PatternKind, PixelFilter};
-use crate::{AovSelection, Error, PixelRect};
+use crate::shade::Optics;
+use crate::{AovSelection, Error, Material, PixelRect};
+use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use std::ops::Range;
 
@@ -35,21 +37,29 @@ pub struct RenderOptions {
     pub cull: bool,
     /// What stands behind everything: linear red, green, blue, and alpha; `None` is transparent.
     pub background: Option<[f32; 4]>,
-    /// How a splat gets its colour.
+    /// How light falls on splats.
     pub shading: Shading,
+    /// What colours splats besides the cloud.
+    pub material: Material,
     /// What is computed besides colour and alpha.
     pub aovs: AovSelection,
     /// Bytes that the fragments of a tile may take; a tile that needs more is split, to a pixel if need be.
     pub tile_memory: usize,
 }
 
-/// How a splat gets its colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How light falls on splats.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shading {
     /// The cloud's colour as it is (white where it has none).
     Color,
     /// The cloud's colour (light grey where it has none), lit by a lamp at the eye.
     Headlight,
+    /// The cloud's colour (light grey where it has none), lit from infinitely far away: Lambert's law, and some light from
+    /// all around.
+    Lambert {
+        /// To the light, in the world; its length does not matter.
+        to_light: DVec3,
+    },
 }
 
 /// Greatest number of samples a pixel.
@@ -72,6 +82,7 @@ impl Default for RenderOptions {
             cull: false,
             background: None,
             shading: Shading::Color,
+            material: Material::default(),
             aovs: AovSelection::default(),
             tile_memory: 64 << 20,
         }
@@ -114,6 +125,16 @@ impl RenderOptions {
             && !(saturation.is_finite() && saturation > 0.0)
         {
             return Err(Error::invalid("wsat", saturation, "a finite number greater than 0"));
+        }
+        if let Shading::Lambert { to_light } = self.shading
+            && !(to_light.is_finite() && to_light.length_squared() > 0.0)
+        {
+            return Err(Error::invalid("light", to_light, "a finite direction, not zero"));
+        }
+        if let Some(Optics::Refract(index)) = self.material.environment.as_ref().map(|all| all.optics)
+            && !(index.is_finite() && index > 0.0)
+        {
+            return Err(Error::invalid("index of refraction", index, "a finite number greater than 0"));
         }
         if let Some(background) = self.background
             && !(background.iter().all(|value| value.is_finite()) && (0.0..=1.0).contains(&background[3]))

@@ -3,7 +3,8 @@
 use crate::film::NO_ID;
 use crate::raster::SamplePlace;
 use crate::sampling::SampleTable;
-use crate::setup::{View, VisibleSplat, base_color};
+use crate::setup::{View, VisibleSplat, shading_normal, splat_color};
+use crate::shade::{Shaded, SplatShader};
 use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading, srgb};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
@@ -24,7 +25,21 @@ pub struct PixelResolver<'a> {
     resolver: Resolver,
     splats: &'a [VisibleSplat],
     surfaces: &'a [SplatSurface],
+    /// If it knows more of the colours than `surfaces`.
+    shader: Option<SplatShader<'a>>,
+    /// The colours of the pixel's splats that were asked for, by rank.
+    shaded: Vec<(u32, Shaded)>,
     sums: Sums,
+}
+
+/// What a fragment's splat shares among its fragments, of this pixel at least.
+fn surface_of(fragment: &Fragment, surfaces: &[SplatSurface], shaded: &[(u32, Shaded)]) -> SplatSurface {
+    let rank = fragment.rank();
+    let surface = surfaces[rank as usize];
+    match shaded.iter().find(|&&(known, _)| known == rank) {
+        None => surface,
+        Some((_, Shaded { color, .. })) => SplatSurface { color: *color, ..surface },
+    }
 }
 
 /// What is summed over the samples of a pixel.
@@ -49,11 +64,13 @@ impl<'a> PixelResolver<'a> {
     pub fn new(
         cloud: &'a Cloud,
         camera: &Camera,
-        options: &RenderOptions,
+        options: &'a RenderOptions,
         view: &'a View,
         splats: &'a [VisibleSplat],
         surfaces: &'a [SplatSurface],
     ) -> Self {
+        let material = &options.material;
+        let needs_shader = material.varies_by_pixel() || (options.aovs.albedo && !material.is_plain());
         Self {
             cloud,
             view,
@@ -64,6 +81,8 @@ impl<'a> PixelResolver<'a> {
             background: options.background,
             resolver: Resolver::new(options.resolve),
             surfaces,
+            shader: needs_shader.then(|| SplatShader::new(cloud, view, options)),
+            shaded: Vec::new(),
             splats,
             sums: Sums::default(),
         }
@@ -72,6 +91,7 @@ impl<'a> PixelResolver<'a> {
     /// Begins a pixel.
     pub fn start(&mut self) {
         self.sums = Sums::default();
+        self.shaded.clear();
     }
 
     /// Adds the next sample, given its fragments.
@@ -79,12 +99,36 @@ impl<'a> PixelResolver<'a> {
         let sample = if fragments.is_empty() {
             SampleColor::NOTHING
         } else {
-            self.resolver.resolve(fragments, self.surfaces)
+            self.shade(place, fragments);
+            self.resolver
+                .resolve_with(fragments, |fragment| surface_of(fragment, self.surfaces, &self.shaded))
         };
         self.add_colors(std::iter::once(sample));
         if !fragments.is_empty() {
             self.add_aovs(place, fragments, samples);
         }
+    }
+
+    /// Makes sure that the colours of some fragments' splats in this pixel are known.
+    fn shade(&mut self, place: SamplePlace, fragments: &[Fragment]) {
+        let Some(shader) = &self.shader else { return };
+        for fragment in fragments {
+            let rank = fragment.rank();
+            if self.shaded.iter().all(|&(known, _)| known != rank) {
+                let index = self.splats[rank as usize].index as usize;
+                if let Some(splat) = shader.splat(index) {
+                    self.shaded.push((rank, shader.shade(&splat, place.x, place.y)));
+                }
+            }
+        }
+    }
+
+    /// The unlit colour of a splat in this pixel.
+    fn albedo(&self, rank: u32) -> [f32; 3] {
+        if let Some((_, shaded)) = self.shaded.iter().find(|&&(known, _)| known == rank) {
+            return shaded.albedo;
+        }
+        splat_color(self.cloud, self.splats[rank as usize].index as usize, self.shading)
     }
 
     /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.
@@ -146,7 +190,7 @@ impl<'a> PixelResolver<'a> {
                 normal_sum += w * self.facing_normal(index);
             }
             if albedo {
-                albedo_sum += w * DVec3::from(base_color(self.cloud, index, self.shading).map(f64::from));
+                albedo_sum += w * DVec3::from(self.albedo(fragment.rank()).map(f64::from));
             }
         }
         let depth = depth_sum / weight;
@@ -161,16 +205,10 @@ impl<'a> PixelResolver<'a> {
 
     /// The world normal of a splat; where normals do not tell the outside, the one that faces the eye.
     fn facing_normal(&self, index: usize) -> DVec3 {
-        let normal = self.cloud.normals[index].as_dvec3().normalize();
         if self.cloud.oriented {
-            return normal;
+            return self.cloud.normals[index].as_dvec3().normalize();
         }
-        let forward = if self.view.orthographic {
-            self.view.world_forward
-        } else {
-            self.cloud.positions[index].as_dvec3() + (self.cloud.origin - self.view.eye)
-        };
-        if normal.dot(forward) > 0.0 { -normal } else { normal }
+        shading_normal(self.cloud, index, self.view)
     }
 
     /// The world position of the point at depth `w` on a sample's ray.

@@ -200,6 +200,26 @@ impl RecordBuffer {
         &self.entries[start as usize..ends[list] as usize]
     }
 
+    /// Number of splats of the region.
+    pub fn splats(&self) -> usize {
+        self.ranks.len()
+    }
+
+    /// Gives the splats that have records in a cell the colours that `color` has for their number and rank, if any.
+    pub fn recolor(&mut self, cell: usize, mut color: impl FnMut(usize, u32) -> Option<[f32; 3]>) {
+        for side in 0..self.sides {
+            let ends = self.lists.as_flattened();
+            let list = side * self.groups * PLACES + cell;
+            let start = if list == 0 { 0 } else { ends[list - 1] };
+            for entry in &self.entries[start as usize..ends[list] as usize] {
+                let number = entry.splat.number();
+                if let Some(color) = color(number, self.ranks[number]) {
+                    self.surfaces[number].color = color;
+                }
+            }
+        }
+    }
+
     /// The record of an entry.
     #[inline(always)]
     pub fn record(&self, entry: Entry) -> &Record {

@@ -7,12 +7,14 @@ use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::ResolveJob;
 use crate::samples::LaneSamples;
+use crate::shade::TileShader;
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
 use splat_core::render::{Frame, Tiles, quarters};
 use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
+use splat_core::shade::SplatShader;
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -239,7 +241,9 @@ impl<'a> Picture<'a> {
         level: Level,
     ) -> Self {
         let samples = LaneSamples::new(&frame.rasterizer);
-        let lattice = Lattice::new(&frame.rasterizer, &frame.view);
+        // Of a cell of a lattice every sample lies in another pixel.
+        let by_pixel = options.material.varies_by_pixel();
+        let lattice = Lattice::new(&frame.rasterizer, &frame.view).filter(|_| !by_pixel);
         Self { cloud, camera, options, frame, samples, lattice, level }
     }
 
@@ -326,9 +330,11 @@ impl<'a> Picture<'a> {
         let start = Instant::now();
         match (self.options.resolve, self.options.aovs) {
             (Resolve::Surface { coverage, thickness: Thickness::AroundHit }, aovs) if few(aovs) => {
+                let mut shader = self.shader();
                 self.level.run_single(ResolveJob {
                     region: *region,
-                    buffer: &worker.records,
+                    buffer: &mut worker.records,
+                    shader: shader.as_mut(),
                     samples: &self.samples,
                     coverage,
                     opaque: self.cloud.opacities.is_none(),
@@ -346,6 +352,13 @@ impl<'a> Picture<'a> {
     /// Whether both sides of a splat can be seen, and are not the same.
     fn two_sided(&self) -> bool {
         self.cloud.oriented && !self.options.cull
+    }
+
+    /// If colours differ from pixel to pixel, the shader for a tile.
+    fn shader(&self) -> Option<TileShader<'_>> {
+        let Frame { view, set_up, .. } = self.frame;
+        let by_pixel = self.options.material.varies_by_pixel();
+        by_pixel.then(|| TileShader::new(SplatShader::new(self.cloud, view, self.options), &set_up.splats))
     }
 
     fn raster_frame(&self) -> RasterFrame<'_> {

@@ -9,16 +9,19 @@ use crate::lattice::Lattice;
 use crate::places::{PLACES, place_of};
 use crate::records::{Entry, RecordBuffer, cell_of};
 use crate::samples::LaneSamples;
+use crate::shade::TileShader;
 use splat_abuffer::{Coverage, MIN_LAYER_WEIGHT, SampleColor, SplatSurface};
 use splat_core::pixel::PixelResolver;
 use splat_core::{Film, PixelRect};
 
 /// Resolves a region's samples into a film that holds the pixels without fragments already.
-pub struct ResolveJob<'a, 'b> {
+pub struct ResolveJob<'a, 'b, 'c> {
     /// The pixels; they lie within one tile.
     pub region: PixelRect,
     /// Their records, grouped.
-    pub buffer: &'a RecordBuffer,
+    pub buffer: &'a mut RecordBuffer,
+    /// If colours differ from pixel to pixel; then there is no lattice.
+    pub shader: Option<&'a mut TileShader<'c>>,
     /// The samples.
     pub samples: &'a LaneSamples,
     /// How much of a sample a surface covers.
@@ -35,7 +38,7 @@ pub struct ResolveJob<'a, 'b> {
     pub film: &'a mut Film,
 }
 
-impl Kernel for ResolveJob<'_, '_> {
+impl Kernel for ResolveJob<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -49,7 +52,7 @@ impl Kernel for ResolveJob<'_, '_> {
     }
 }
 
-impl ResolveJob<'_, '_> {
+impl ResolveJob<'_, '_, '_> {
     /// Resolves cells of samples of one pixel.
     #[inline(always)]
     fn resolve_pixels<L: Lanes, const OPAQUE: bool>(&mut self) {
@@ -59,6 +62,10 @@ impl ResolveJob<'_, '_> {
                 let place = place_of(x, y);
                 if (0..groups).all(|group| self.buffer.is_empty(cell_of(place, group))) {
                     continue;
+                }
+                if let Some(shader) = &mut self.shader {
+                    let cells = (0..groups).map(|group| cell_of(place, group));
+                    shader.shade(self.buffer, cells, place, x, y);
                 }
                 self.pixels.start();
                 for group in 0..groups {

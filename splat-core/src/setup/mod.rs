@@ -22,11 +22,13 @@ pub use margin::{MAX_ERROR, USUAL as USUAL_MARGIN};
 pub use order::{SortKey, sort_keys, splat_order};
 pub use outline::Outline;
 pub use projection::project;
+pub(crate) use projection::rotation;
 pub(crate) use view::Reach;
 pub use view::View;
 
 use crate::evaluate::SplatConstants;
 use crate::options::Shading;
+use crate::shade::SplatShader;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
 use glam::DVec3;
 use margin::Margin;
@@ -46,6 +48,9 @@ const UNCOLORED_LIT: [f32; 3] = [0.6; 3];
 
 /// Light that reaches a surface seen edge-on, relative to one that faces the headlight.
 const HEADLIGHT_AMBIENT: f64 = 0.04;
+
+/// Light that reaches a surface which faces away from the lamp, relative to one that faces it.
+const LAMBERT_AMBIENT: f64 = 0.15;
 
 /// A splat in camera space, in `f64`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,7 +167,7 @@ impl SetUp {
             return Outcome::EdgeOn;
         }
         let depth = view.depth_extent(&splat, radius);
-        self.surfaces.push(surface(cloud, index, &splat, view, options));
+        self.surfaces.push(surface(cloud, index, &splat, &exact, view, options));
         self.splats.push(VisibleSplat {
             constants,
             bounds,
@@ -335,7 +340,7 @@ fn shows_back(cloud: &Cloud, index: usize, from_eye: DVec3, view: &View) -> bool
 
 /// The sigma-scaled tangent axes of a splat in the world (L54-61).
 #[inline(always)]
-fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 2] {
+pub(crate) fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 2] {
     match &cloud.shapes {
         Shapes::Discs(sizes) => {
             let size = f64::from(sizes[index]);
@@ -414,32 +419,66 @@ fn surface(
     cloud: &Cloud,
     index: usize,
     splat: &CameraSplat,
+    exact: &SplatConstants<f64>,
     view: &View,
     options: &RenderOptions,
 ) -> SplatSurface {
-    let shade = match options.shading {
+    let color = if options.material.is_plain() {
+        let light = light(splat, || shading_normal(cloud, index, view), view, options) as f32;
+        let color = splat_color(cloud, index, options.shading);
+        finished_color(color.map(|value| value * light), options)
+    } else {
+        SplatShader::new(cloud, view, options).whole(index, splat, exact).color
+    };
+    let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
+    SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }
+}
+
+/// The unit world normal of a splat on the viewer's side.
+pub(crate) fn shading_normal(cloud: &Cloud, index: usize, view: &View) -> DVec3 {
+    let normal = cloud.normals[index].as_dvec3().normalize();
+    let away = if view.orthographic { view.world_forward } else { from_eye(cloud, index, view) };
+    if normal.dot(away) > 0.0 { -normal } else { normal }
+}
+
+/// The light on a splat with this [`shading_normal`].
+#[inline(always)]
+pub(crate) fn light(
+    splat: &CameraSplat,
+    normal: impl FnOnce() -> DVec3,
+    view: &View,
+    options: &RenderOptions,
+) -> f64 {
+    match options.shading {
         Shading::Color => 1.0,
         Shading::Headlight => {
             let to_viewer = if view.orthographic { DVec3::Z } else { splat.center.normalize() };
             HEADLIGHT_AMBIENT + (1.0 - HEADLIGHT_AMBIENT) * splat.normal.dot(to_viewer).abs()
         }
-    };
-    let mut color = base_color(cloud, index, options.shading)
-        .map(|value| (value * shade as f32).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE));
-    if options.resolve == Resolve::Over {
-        // Trained splats blend in their display space.
-        color = color.map(|value| srgb::encode(f64::from(value)) as f32);
+        Shading::Lambert { to_light } => {
+            let cosine = normal().dot(to_light.normalize());
+            LAMBERT_AMBIENT + (1.0 - LAMBERT_AMBIENT) * cosine.max(0.0)
+        }
     }
-    let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
-    SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }
 }
 
-/// The unlit, linear colour of a splat.
-pub fn base_color(cloud: &Cloud, index: usize, shading: Shading) -> [f32; 3] {
+/// A colour in the resolve's terms.
+#[inline(always)]
+pub(crate) fn finished_color(color: [f32; 3], options: &RenderOptions) -> [f32; 3] {
+    let color = color.map(|value| value.clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE));
+    if options.resolve == Resolve::Over {
+        // Trained splats blend in their display space.
+        return color.map(|value| srgb::encode(f64::from(value)) as f32);
+    }
+    color
+}
+
+/// The unlit, linear colour of a splat as the cloud has it.
+pub fn splat_color(cloud: &Cloud, index: usize, shading: Shading) -> [f32; 3] {
     match (&cloud.colors, shading) {
         (Some(colors), _) => colors[index].to_array(),
         (None, Shading::Color) => UNCOLORED,
-        (None, Shading::Headlight) => UNCOLORED_LIT,
+        (None, Shading::Headlight | Shading::Lambert { .. }) => UNCOLORED_LIT,
     }
 }
 

@@ -4,13 +4,42 @@ use super::bounds::{deep_reference, half_depth};
 use super::view::floor;
 use super::{CameraSplat, View};
 use crate::evaluate::SplatConstants;
-use glam::{DVec2, Vec3Swizzles};
+use glam::{DVec2, DVec3, Vec3Swizzles};
 
 /// Below this ratio of |det J| to the product of its rows a splat is seen edge-on, and dropped.
 const EDGE_ON: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A reference point farther than this from pixel 0 (in pixels) does not fit the integer part of the offset.
 const MAX_PIXEL: f64 = (1u64 << 30) as f64;
+
+/// The (c, s) by which [`project`] rotates the basis of a splat that is not seen edge-on: (u', v') = (c u + s v, c v - s u).
+pub fn rotation(splat: &CameraSplat, view: &View) -> [f64; 2] {
+    let [u, v] = reference(splat, view).unwrap_or([0.0; 2]);
+    let (_, rows) = jacobian(splat, splat.center + u * splat.axes[0] + v * splat.axes[1], view);
+    let q = DVec2::new(rows[0].y, rows[1].y).length();
+    [rows[0].y / q, rows[1].y / q]
+}
+
+/// The reference point's (u, v), if it is not the centre.
+#[inline(always)]
+fn reference(splat: &CameraSplat, view: &View) -> Option<[f64; 2]> {
+    if view.orthographic {
+        return None;
+    }
+    deep_reference(splat, view.radius, half_depth(splat, view.radius))
+}
+
+/// The screen coordinates of a point of a splat, and J, the Jacobian of the projection there; its rows are d(pixel)/du and
+/// d(pixel)/dv.
+#[inline(always)]
+fn jacobian(splat: &CameraSplat, point: DVec3, view: &View) -> (DVec2, [DVec2; 2]) {
+    let scale = view.pixel_scale;
+    if view.orthographic {
+        return (point.xy(), splat.axes.map(|t| t.xy() * scale));
+    }
+    let screen = point.xy() / point.z;
+    (screen, splat.axes.map(|t| (t.xy() - screen * t.z) * scale / point.z))
+}
 
 /// The constants of a splat, exact to `f64`. `None` if it is seen edge-on.
 ///
@@ -19,19 +48,11 @@ const MAX_PIXEL: f64 = (1u64 << 30) as f64;
 pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> {
     let [t1, t2] = splat.axes;
     let scale = view.pixel_scale;
-    let radius = view.radius;
-    let deep =
-        if view.orthographic { None } else { deep_reference(splat, radius, half_depth(splat, radius)) };
+    let deep = reference(splat, view);
     let [u, v] = deep.unwrap_or([0.0; 2]);
     let point = splat.center + u * t1 + v * t2;
 
-    // J, the Jacobian of the projection at the reference point; its rows are d(pixel)/du and d(pixel)/dv.
-    let (screen, rows) = if view.orthographic {
-        (point.xy(), [t1.xy() * scale, t2.xy() * scale])
-    } else {
-        let screen = point.xy() / point.z;
-        (screen, [t1, t2].map(|t| (t.xy() - screen * t.z) * scale / point.z))
-    };
+    let (screen, rows) = jacobian(splat, point, view);
     let determinant = rows[0].perp_dot(rows[1]);
     let has_area = determinant.abs() > EDGE_ON * (rows[0].length_squared() * rows[1].length_squared()).sqrt();
     if !has_area {

@@ -9,6 +9,7 @@ pub mod footprint;
 pub mod function;
 pub mod mapping;
 pub mod pyramid;
+pub mod textures;
 
 pub use differentials::{Ray, RayDifferential, Surface, SurfaceDifferentials};
 pub use filter::{Filter, Magnification, Probes, Quality, Sampler, SummedArea};
@@ -19,3 +20,4 @@ pub use mapping::{
     TexturePoint, UvMapping,
 };
 pub use pyramid::{Pyramid, PyramidError, Texels, Wrap};
+pub use textures::{FunctionTexture, ImageTexture, Mapping, Placement, SurfacePoint, Texture};

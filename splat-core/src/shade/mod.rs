@@ -1,0 +1,145 @@
+//! The splat shader (L161-162): from the cloud's colours, textures and surroundings to the colour of a splat, or of a splat
+//! in a pixel.
+
+mod splat;
+
+pub use splat::{Shaded, ShadedSplat, SplatShader};
+
+use crate::texture::textures::{Mapping, SurfacePoint};
+use crate::texture::{Pyramid, RayDifferential, Sampler, SpacePoint, SphericalMapping, Texture};
+use glam::{DAffine3, DVec3};
+use std::fmt;
+use std::sync::Arc;
+
+/// What colours a surface besides the cloud's own colours. The default is nothing, and costs nothing.
+#[derive(Clone, Default)]
+pub struct Material {
+    /// In place of the cloud's colours.
+    pub texture: Option<Arc<Texture>>,
+    /// How often textures and surroundings are looked up.
+    pub detail: Detail,
+    /// What the surface shows of its surroundings, in place of its colour.
+    pub environment: Option<Arc<Environment>>,
+    /// Has the last word on the colour.
+    pub shader: Option<Arc<Shader>>,
+}
+
+/// A caller's shader: given a point and the linear colour there, lit, the colour that it shall have.
+pub type Shader = dyn Fn(&ShadedPoint, [f32; 3]) -> [f32; 3] + Send + Sync;
+
+/// A point of a surface as a shader sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadedPoint {
+    /// Where it is, in the world and on the texture, and how that changes from pixel to pixel.
+    pub surface: SurfacePoint,
+    /// Unit normal, in the world, on the viewer's side.
+    pub normal: DVec3,
+    /// Whether that is the splat's back.
+    pub back: bool,
+    /// The rays from the viewer; their directions are of unit length.
+    pub ray: RayDifferential,
+    /// Index of the splat in the cloud.
+    pub index: usize,
+}
+
+/// How often textures and surroundings are looked up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Detail {
+    /// Once a splat and pixel; splats smaller than half a pixel once.
+    #[default]
+    Fragment,
+    /// Once a splat.
+    Splat,
+}
+
+impl Material {
+    /// Whether there is nothing but the cloud's colours.
+    pub fn is_plain(&self) -> bool {
+        self.texture.is_none() && self.environment.is_none() && self.shader.is_none()
+    }
+
+    /// Whether a splat's colour differs from pixel to pixel.
+    pub fn varies_by_pixel(&self) -> bool {
+        !self.is_plain() && self.detail == Detail::Fragment
+    }
+}
+
+/// Two materials are equal if they share what they are made of.
+impl PartialEq for Material {
+    fn eq(&self, other: &Self) -> bool {
+        fn same<T: ?Sized>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
+            a.as_ref().map(|a| Arc::as_ptr(a).cast::<()>()) == b.as_ref().map(|b| Arc::as_ptr(b).cast::<()>())
+        }
+        same(&self.texture, &other.texture)
+            && self.detail == other.detail
+            && same(&self.environment, &other.environment)
+            && same(&self.shader, &other.shader)
+    }
+}
+
+impl fmt::Debug for Material {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Material")
+            .field("texture", &self.texture)
+            .field("detail", &self.detail)
+            .field("environment", &self.environment)
+            .field("shader", &self.shader.as_ref().map(|_| "a closure"))
+            .finish()
+    }
+}
+
+/// How surroundings are seen in a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Optics {
+    /// As in a mirror.
+    Reflect,
+    /// Through it, into a medium with this index of refraction relative to the viewer's, 1.5 for glass; where a back is
+    /// seen, out of it. Total reflection mirrors.
+    Refract(f64),
+}
+
+/// Surroundings, infinitely far away: an image of all directions, by longitude and latitude.
+#[derive(Debug, Clone)]
+pub struct Environment {
+    /// The image; its upper edge is straight up.
+    pub image: Arc<Pyramid>,
+    /// How it is filtered.
+    pub sampler: Sampler,
+    /// From world directions to those of the image, whose up is +z, and whose middle column is -x.
+    pub world_to_image: DAffine3,
+    /// How it is seen.
+    pub optics: Optics,
+}
+
+impl Environment {
+    /// The linear colour seen from a point with this unit normal by the viewer's rays. `back` if they meet the inside.
+    fn color(&self, point: DVec3, normal: DVec3, back: bool, rays: &RayDifferential) -> [f32; 3] {
+        // Of a splat no more is known than its plane.
+        let surface = crate::texture::Surface {
+            position: point,
+            normal,
+            position_derivatives: [DVec3::ZERO; 2],
+            normal_derivatives: [DVec3::ZERO; 2],
+        };
+        let differentials = surface.differentials(rays);
+        let seen = match self.optics {
+            Optics::Reflect => None,
+            Optics::Refract(index) => {
+                rays.refracted(&surface, &differentials, if back { index } else { 1.0 / index })
+            }
+        };
+        let seen = seen.unwrap_or_else(|| rays.reflected(&surface, &differentials));
+        let direction = seen.ray.direction;
+        let image = crate::texture::textures::ImageTexture {
+            pyramid: self.image.clone(),
+            sampler: self.sampler,
+            mapping: Mapping::Spherical(SphericalMapping { world_to_texture: self.world_to_image }),
+        };
+        let space = SpacePoint {
+            point: direction,
+            dx: seen.next[0].direction - direction,
+            dy: seen.next[1].direction - direction,
+        };
+        image.color(&SurfacePoint { space, ..SurfacePoint::default() })
+    }
+}
