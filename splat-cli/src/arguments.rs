@@ -1,8 +1,9 @@
 //! The command line as it is written: raw options, before anything is known of the cloud.
 
 use crate::choices::{
-    CompressionChoice, CoverageChoice, EngineChoice, ExrTypeChoice, FilterChoice, KernelChoice,
-    PatternChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice, UpChoice,
+    CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice, FilterChoice, KernelChoice,
+    MappingChoice, PatternChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice,
+    TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
 use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
@@ -114,6 +115,9 @@ pub struct RenderArguments {
     /// What the splats look like.
     #[command(flatten, next_help_heading = "Splats")]
     pub splats: SplatArguments,
+    /// Textures and surroundings.
+    #[command(flatten, next_help_heading = "Material")]
+    pub material: MaterialArguments,
     /// What is written.
     #[command(flatten, next_help_heading = "Output")]
     pub outputs: OutputArguments,
@@ -213,13 +217,51 @@ pub struct SplatArguments {
     /// Factor on all sizes, given and estimated
     #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
     pub radius_scale: f64,
-    /// How a splat gets its colour
+    /// How light falls on splats
     #[arg(long, value_name = "SHADING", default_value = "auto")]
     pub shading: ShadingChoice,
+    /// Where --shading lambert has its light: AZIMUTH,ELEVATION in degrees, as in --view [default: 45,45]
+    #[arg(long, value_name = "DIRECTION", value_parser = values::view, allow_hyphen_values = true)]
+    pub light: Option<ViewDirection>,
     /// Linear R,G,B or R,G,B,A behind everything, or none
     #[arg(long, value_name = "COLOR", value_parser = values::background, default_value = "none")]
     #[arg(allow_hyphen_values = true)]
     pub background: Background,
+}
+
+/// Textures and surroundings.
+#[derive(Debug, Clone, Args)]
+pub struct MaterialArguments {
+    /// An image (.png, .exr) on the surface, in place of the cloud's colours
+    #[arg(long, value_name = "IMAGE")]
+    pub texture: Option<PathBuf>,
+    /// How it lies on the surface [default: uv]
+    #[arg(long, value_name = "MAPPING")]
+    pub mapping: Option<MappingChoice>,
+    /// What lies beyond its edges [default: repeat]
+    #[arg(long, value_name = "WRAP")]
+    pub texture_wrap: Option<WrapChoice>,
+    /// How often it is repeated over the unit square of --mapping uv [default: 1,1]
+    #[arg(long, value_name = "S,T", value_parser = values::repeat, allow_hyphen_values = true)]
+    pub texture_repeat: Option<[f64; 2]>,
+    /// How images are filtered
+    #[arg(long, value_name = "FILTER", default_value = "ewa-vc")]
+    pub texture_filter: TextureFilterChoice,
+    /// How many times as long as wide a filter may be: bounds the time of a lookup, 1 to 256
+    #[arg(long, value_name = "A", value_parser = values::anisotropy, default_value_t = 16.0)]
+    pub max_anisotropy: f64,
+    /// How often images are looked up
+    #[arg(long, value_name = "DETAIL", default_value = "fragment")]
+    pub texture_detail: DetailChoice,
+    /// An image (.png, .exr) of all directions by longitude and latitude, up above, to be seen in the surface
+    #[arg(long, value_name = "IMAGE")]
+    pub environment: Option<PathBuf>,
+    /// See the surroundings as in a mirror; the default
+    #[arg(long, conflicts_with = "refract")]
+    pub reflect: bool,
+    /// See the surroundings through the surface, whose index of refraction this is (glass: 1.5)
+    #[arg(long, value_name = "IOR", value_parser = values::positive)]
+    pub refract: Option<f64>,
 }
 
 /// What is written besides the picture, and how.
@@ -292,7 +334,9 @@ mod tests {
                     --focus inf --blades 6 --near 0.1 --filter box --pattern poisson --kernel disc \
                     --cutoff 2 --exp floor256 --resolve surface --coverage soft --wsat 0.9 --thickness \
                     listing --cull --radius-scale 1.5 --background 0,0,0,1 --aov depth,id --engine \
-                    reference --threads 4 --seed 7 --quiet --progress json --stats - --shading headlight \
+                    reference --threads 4 --seed 7 --quiet --progress json --stats - --shading lambert \
+                    --light 30,-10 --texture t.png --mapping planar --texture-wrap clamp --texture-filter \
+                    trilinear --max-anisotropy 8 --texture-detail splat --environment e.exr --reflect \
                     --exr-type float --exr-compression piz";
         let arguments = render(line).unwrap();
         assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
@@ -322,6 +366,7 @@ mod tests {
             "--ortho --blades 6",
             "--crop 0,0,4,4 --tile 0/2x2",
             "--quiet -v",
+            "--environment e.exr --reflect --refract 1.5",
         ];
         for line in contradictions {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ArgumentConflict, "{line}");

@@ -1,8 +1,10 @@
 //! Options that are one of a few words, and what they stand for.
 
 use clap::ValueEnum;
+use glam::DVec3;
 use splat_core::fit::Up;
-use splat_core::{Kernel, PatternKind, PixelFilter, Shading, TableMode};
+use splat_core::texture::{Filter, Probes, Quality, Wrap};
+use splat_core::{Detail, Kernel, PatternKind, PixelFilter, Shading, TableMode};
 
 /// `--up`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -150,17 +152,114 @@ pub enum ShadingChoice {
     Color,
     /// Lit by a lamp at the eye
     Headlight,
+    /// Lit from far away: see --light
+    Lambert,
 }
 
 impl ShadingChoice {
-    /// The shading of a cloud, given whether it has colours.
-    pub fn shading(self, has_colors: bool) -> Shading {
+    /// The shading of a cloud, given whether it has colours and where a distant light is.
+    pub fn shading(self, has_colors: bool, to_light: DVec3) -> Shading {
         match self {
             Self::Auto if has_colors => Shading::Color,
             Self::Auto | Self::Headlight => Shading::Headlight,
             Self::Color => Shading::Color,
+            Self::Lambert => Shading::Lambert { to_light },
         }
     }
+}
+
+/// `--mapping`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum MappingChoice {
+    /// By the cloud's own texture coordinates
+    #[default]
+    Uv,
+    /// By longitude and latitude around the middle of the cloud; the front shows the middle of the image
+    Spherical,
+    /// Around the cloud's up axis, as high as the cloud
+    Cylindrical,
+    /// As seen from the front, as large as the cloud
+    Planar,
+}
+
+/// `--texture-wrap`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum WrapChoice {
+    /// The image again
+    #[default]
+    Repeat,
+    /// Its edge
+    Clamp,
+    /// The image mirrored
+    Mirror,
+    /// Black
+    Black,
+}
+
+impl From<WrapChoice> for Wrap {
+    fn from(choice: WrapChoice) -> Self {
+        match choice {
+            WrapChoice::Repeat => Self::Repeat,
+            WrapChoice::Clamp => Self::Clamp,
+            WrapChoice::Mirror => Self::Mirror,
+            WrapChoice::Black => Self::Black,
+        }
+    }
+}
+
+/// `--texture-filter`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum TextureFilterChoice {
+    /// pbrt's triangle filter: fast, blurred where a surface is seen at an angle
+    Trilinear,
+    /// pbrt's EWA as printed, its errata included
+    EwaPrinted,
+    /// pbrt's EWA, corrected
+    Ewa,
+    /// Footprint Assembly, a power of two of probes
+    Texram,
+    /// Footprint Assembly, as many probes as it takes, with Gaussian weights
+    Probes,
+    /// Variance-compensated EWA: the most accurate
+    #[default]
+    EwaVc,
+}
+
+impl From<TextureFilterChoice> for Filter {
+    fn from(choice: TextureFilterChoice) -> Self {
+        match choice {
+            TextureFilterChoice::Trilinear => Self::Trilinear,
+            TextureFilterChoice::EwaPrinted => Self::EwaPrinted,
+            TextureFilterChoice::Ewa => Self::Ewa,
+            TextureFilterChoice::Texram => Self::Assembly(Probes::Texram),
+            TextureFilterChoice::Probes => Self::Assembly(Probes::Gaussian),
+            TextureFilterChoice::EwaVc => Self::EwaVc(Quality::DEFAULT),
+        }
+    }
+}
+
+/// `--texture-detail`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum DetailChoice {
+    /// Once a splat and pixel
+    #[default]
+    Fragment,
+    /// Once a splat: faster, and enough where splats are no larger than texels
+    Splat,
+}
+
+impl From<DetailChoice> for Detail {
+    fn from(choice: DetailChoice) -> Self {
+        match choice {
+            DetailChoice::Fragment => Self::Fragment,
+            DetailChoice::Splat => Self::Splat,
+        }
+    }
+}
+
+/// The word for a choice on the command line.
+pub fn word(choice: &impl ValueEnum) -> String {
+    choice.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
 /// `--engine`.
@@ -251,7 +350,12 @@ mod tests {
         assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8", "poly8"]);
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
         assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
-        assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight"]);
+        assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight", "lambert"]);
+        assert_eq!(words::<MappingChoice>(), ["uv", "spherical", "cylindrical", "planar"]);
+        assert_eq!(words::<WrapChoice>(), ["repeat", "clamp", "mirror", "black"]);
+        let filters = ["trilinear", "ewa-printed", "ewa", "texram", "probes", "ewa-vc"];
+        assert_eq!(words::<TextureFilterChoice>(), filters);
+        assert_eq!(words::<DetailChoice>(), ["fragment", "splat"]);
         assert_eq!(words::<EngineChoice>(), ["reference", "fast", "both"]);
         assert_eq!(words::<ProgressChoice>(), ["auto", "json", "none"]);
         assert_eq!(words::<ExrTypeChoice>(), ["half", "float"]);
@@ -260,9 +364,9 @@ mod tests {
 
     #[test]
     fn a_cloud_without_colours_gets_a_headlight() {
-        assert_eq!(ShadingChoice::Auto.shading(true), Shading::Color);
-        assert_eq!(ShadingChoice::Auto.shading(false), Shading::Headlight);
-        assert_eq!(ShadingChoice::Color.shading(false), Shading::Color);
-        assert_eq!(ShadingChoice::Headlight.shading(true), Shading::Headlight);
+        assert_eq!(ShadingChoice::Auto.shading(true, DVec3::Z), Shading::Color);
+        assert_eq!(ShadingChoice::Auto.shading(false, DVec3::Z), Shading::Headlight);
+        assert_eq!(ShadingChoice::Color.shading(false, DVec3::Z), Shading::Color);
+        assert_eq!(ShadingChoice::Headlight.shading(true, DVec3::Z), Shading::Headlight);
     }
 }

@@ -14,6 +14,7 @@ mod describe;
 mod engine;
 mod info;
 mod inputs;
+mod material;
 mod output;
 mod progress;
 mod render;

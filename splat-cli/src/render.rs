@@ -7,7 +7,7 @@ use crate::engine::Engine;
 use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
-use crate::{describe, inputs, output, resolve};
+use crate::{describe, inputs, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -49,11 +49,19 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     });
     times.prepare = time;
     inputs::check_usable(&cloud, &reports)?;
-    let (camera, options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
+    let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
+    let up = resolve::up(&arguments.camera, &cloud);
+    options.material = material::material(&arguments.material, &cloud, up, console)?;
+    options.check()?;
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-    let metadata = Metadata { input_hash: Some(hashes.join(" ")), ..metadata(&camera, &options, &engine) };
+    let in_words = describe::options(&options) + &material::describe(&arguments.material);
+    let metadata = Metadata {
+        input_hash: Some(hashes.join(" ")),
+        options: Some(in_words),
+        ..metadata(&camera, &options, &engine)
+    };
     let (written, time) = progress.stage("write", |_| {
         write_picture(&arguments.output, &rendered.film, &metadata, &exr_options(&arguments.outputs))
     });

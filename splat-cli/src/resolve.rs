@@ -4,12 +4,13 @@
 //! settled against the prepared cloud: [`against_cloud`].
 
 use crate::arguments::{CameraArguments, RenderArguments, SampleArguments, SplatArguments};
-use crate::choices::{CoverageChoice, ResolveChoice};
+use crate::choices::{CoverageChoice, ResolveChoice, ShadingChoice};
+use crate::material;
 use crate::usage::UsageError;
 use crate::values::{ThicknessValue, ViewDirection};
 use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
-use splat_core::fit::{Framing, NEAR, Up, fit};
+use splat_core::fit::{Framing, NEAR, Up, direction, fit};
 use splat_core::{Camera, Cloud, Kernel, Lens, PixelRect, Projection, RenderOptions};
 
 /// Size of the picture where neither an option nor a camera says anything, in pixels.
@@ -17,6 +18,9 @@ const DEFAULT_SIZE: [u32; 2] = [1280, 960];
 
 /// The three-quarter view.
 const DEFAULT_VIEW: ViewDirection = ViewDirection { azimuth: 30.0, elevation: 20.0 };
+
+/// The light from above the viewer's right shoulder, for someone who looks at the front.
+const DEFAULT_LIGHT: ViewDirection = ViewDirection { azimuth: 45.0, elevation: 45.0 };
 
 /// The options of the renderer, save what depends on the cloud: shading and window.
 ///
@@ -29,6 +33,10 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
         return Err(UsageError::new(NEEDS_LENS));
     }
     let (samples, splats) = (&arguments.samples, &arguments.splats);
+    if splats.light.is_some() && splats.shading != ShadingChoice::Lambert {
+        return Err(UsageError::new("--light says nothing without --shading lambert"));
+    }
+    material::check(&arguments.material)?;
     let (kernel, cutoff) = match splats.resolve {
         ResolveChoice::Surface => (Kernel::Windowed, 4.0),
         ResolveChoice::Over => (Kernel::Gaussian, 9.0),
@@ -116,15 +124,23 @@ pub fn against_cloud(
     apply_lens(&arguments.camera, &mut camera, centre)?;
     camera.check().map_err(UsageError::new)?;
     options.window = window(&arguments.samples, camera.width, camera.height)?;
-    options.shading = arguments.splats.shading.shading(cloud.colors.is_some());
+    let has_colors = cloud.colors.is_some() || arguments.material.texture.is_some();
+    let light = arguments.splats.light.unwrap_or(DEFAULT_LIGHT);
+    let to_light = direction(up(&arguments.camera, cloud), light.azimuth, light.elevation);
+    options.shading = arguments.splats.shading.shading(has_colors, to_light);
     Ok((camera, options))
+}
+
+/// The axis that points up.
+pub fn up(arguments: &CameraArguments, cloud: &Cloud) -> Up {
+    arguments.up.map_or_else(|| assumed_up(cloud), Up::from)
 }
 
 /// From where a fitted camera looks.
 fn framing(arguments: &CameraArguments, cloud: &Cloud) -> Framing {
     let [width, height] = arguments.size.unwrap_or(DEFAULT_SIZE);
     let ViewDirection { azimuth, elevation } = arguments.view.unwrap_or(DEFAULT_VIEW);
-    let up = arguments.up.map_or_else(|| assumed_up(cloud), Up::from);
+    let up = up(arguments, cloud);
     Framing { width, height, up, azimuth, elevation, orthographic: arguments.ortho }
 }
 

@@ -33,6 +33,17 @@ pub fn cutoff(text: &str) -> Result<f64, String> {
     number(text, "a number greater than 0, at most 64", |value| value > 0.0 && value <= 64.0)
 }
 
+/// `--texture-repeat`: two numbers.
+pub fn repeat(text: &str) -> Result<[f64; 2], String> {
+    let pair = split(text, ',').filter(|pair: &[f64; 2]| pair.iter().all(|value| value.is_finite()));
+    pair.ok_or_else(|| "expected S,T, two finite numbers".to_owned())
+}
+
+/// `--max-anisotropy`.
+pub fn anisotropy(text: &str) -> Result<f64, String> {
+    number(text, "a number from 1 to 256", |value| (1.0..=256.0).contains(&value))
+}
+
 /// `--size`: width and height, in pixels.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     const SIDES: RangeInclusive<u32> = 1..=splat_core::camera::MAX_SIDE;

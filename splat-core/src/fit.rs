@@ -101,12 +101,20 @@ pub fn fit(cloud: &Cloud, framing: &Framing, options: &RenderOptions) -> Result<
     })
 }
 
+/// The unit vector from a cloud's centre towards a place around it, as [`Framing`] describes that of a camera; angles in
+/// degrees.
+pub fn direction(up: Up, azimuth: f64, elevation: f64) -> DVec3 {
+    let [up, front, side] = up.axes();
+    let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
+    let horizontal = libm::cos(azimuth) * front + libm::sin(azimuth) * side;
+    libm::cos(elevation) * horizontal + libm::sin(elevation) * up
+}
+
 /// World to camera axes: right, down, forward.
 fn rotation(framing: &Framing) -> DMat3 {
-    let [up, front, side] = framing.up.axes();
-    let (azimuth, elevation) = (framing.azimuth.to_radians(), framing.elevation.to_radians());
-    let horizontal = libm::cos(azimuth) * front + libm::sin(azimuth) * side;
-    let towards_camera = libm::cos(elevation) * horizontal + libm::sin(elevation) * up;
+    let [_, front, side] = framing.up.axes();
+    let azimuth = framing.azimuth.to_radians();
+    let towards_camera = direction(framing.up, framing.azimuth, framing.elevation);
     let right = libm::cos(azimuth) * side - libm::sin(azimuth) * front;
     let forward = -towards_camera;
     let down = forward.cross(right);

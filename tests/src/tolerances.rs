@@ -487,3 +487,20 @@ pub const SPACING_SCATTER: f64 = 0.12;
 /// 4 * 1000 random candidates have a standard deviation of 1.6 % (3.2 %), of which the elimination evens out a part.
 /// Measured: 1.8 %.
 pub const EVEN_SHARE: f64 = 0.05;
+
+// ---------------------------------------------------------------------------------------------------------
+// The splat shader
+
+/// Where a texture is seen, in pixels: a lookup is drawn towards its splat's centre by 1 - 1/(1 + .136/sigma^2), sigma in
+/// pixels, times up to 2 sigma, which the splats on all sides of a pixel cancel but for the part that their weights differ by
+/// within a pixel; a tilted splat has a sigma of 1.9 pixels at 62 degrees. Plus the mean of the samples that a pixel has.
+pub const TEXTURE_PLACE: f64 = 0.1;
+
+/// A direction from a sky of 256 x 128 texels, as seen in a plane mirror: within half a row of a pole (pi/256 = .0123) the
+/// last row stands for the pole; plus the mean over a pixel's footprint (1/100, squared) and the splats' own places.
+pub const SKY_TEXEL: f64 = 0.015;
+
+/// How far from its centre a splat is looked up, in sigma: the mean of the product of two Gaussians, at most 2 (the
+/// radius) times the part that the pixel has, plus a semi-axis of 1/sqrt(KERNEL_VARIANCE) = 2.71 times the root of the
+/// other part: at most sqrt(2^2 + 2.71^2) with equality where both have half.
+pub const LOOKUP_REACH: f64 = 3.4;
