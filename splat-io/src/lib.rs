@@ -31,11 +31,3 @@ pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::write_png;
-
-/// Stub until the images branch lands.
-pub fn read_pyramid(
-    _: &std::path::Path,
-    _: [splat_core::texture::Wrap; 2],
-) -> Result<splat_core::texture::Pyramid, Error> {
-    unimplemented!()
-}
