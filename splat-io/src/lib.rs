@@ -1,4 +1,4 @@
-//! Clouds, cameras and pictures in and out of files.
+//! Clouds, cameras and pictures in and out of files, textures in.
 //!
 //! Every byte of input is taken as hostile: a size that a file claims is held against the size that the file
 //! has before anything is allocated, and whatever is wrong becomes an [`Error`] that says where it is, what
@@ -18,6 +18,7 @@ pub mod ply;
 pub mod png_file;
 mod source;
 pub mod srgb;
+pub mod texture_file;
 
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
@@ -31,3 +32,4 @@ pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::write_png;
+pub use texture_file::{read_pyramid, read_pyramid_from};
