@@ -195,6 +195,9 @@ fn prefix(name: &[u8]) -> Option<&[u8]> {
     name.iter().rposition(|&byte| byte == b'.').map(|point| &name[..=point])
 }
 
+/// The most channels of a part: each costs time in each block, however small the block is.
+const MAX_CHANNELS: usize = 1024;
+
 /// The blocks of a part, all checked.
 struct Layout<'a> {
     part: &'a Part,
@@ -214,6 +217,14 @@ impl<'a> Layout<'a> {
     fn new(part: &'a Part, file_size: u64, path: &Path) -> Result<Self, Error> {
         let [width, height] = part.size;
         let pixels = check_size(path, width, height)?;
+        let count = part.channels.len();
+        if count > MAX_CHANNELS {
+            return Err(Error::limit(
+                path,
+                format!("an image of {count} channels"),
+                MAX_CHANNELS.to_string(),
+            ));
+        }
         let compression = part.compression.map_err(|number| {
             let found = format!("OpenEXR compression {number}");
             Error::unsupported(path, found, "none, RLE, ZIP, ZIPS, PIZ, PXR24, B44, B44A, DWAA or DWAB")

@@ -484,6 +484,21 @@ fn every_compression_is_unpacked() {
     }
 }
 
+/// The decoder would allocate what the block says.
+#[test]
+fn a_dwa_block_that_claims_too_much_is_refused() {
+    let intact = packed_exr([32, 32], Compression::DWAA(None), Blocks::ScanLines);
+    let int = |at: usize| u32::from_le_bytes(intact[at..at + 4].try_into().unwrap()) as usize;
+    let block =
+        (0..intact.len() - 8).find(|&at| int(at) == 0 && int(at + 4) == intact.len() - at - 8).unwrap();
+    for counter in [1, 6, 7, 8, 9] {
+        let mut bytes = intact.clone();
+        bytes[block + 8 + 8 * counter + 5] = 1;
+        let message = message(&bytes);
+        assert!(message.contains(&format!("in counter {counter}, at most")), "{message}");
+    }
+}
+
 /// Small files of every kind, for damage.
 fn specimens() -> Vec<Vec<u8>> {
     let mut files: Vec<Vec<u8>> = COMPRESSIONS
