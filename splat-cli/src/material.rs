@@ -66,13 +66,11 @@ pub fn material(
     }
     if let Some(path) = &arguments.environment {
         let [up, front, _] = up.axes();
-        material.environment = Some(Arc::new(Environment {
-            image: image(path, [Wrap::Repeat, Wrap::Clamp], console)?,
-            sampler: sampler(arguments),
-            // The middle of the image is what someone sees who looks at the front.
-            world_to_image: DAffine3::from_mat3(axes(front, up)),
-            optics: arguments.refract.map_or(Optics::Reflect, Optics::Refract),
-        }));
+        let image = image(path, [Wrap::Repeat, Wrap::Clamp], console)?;
+        // The middle of the image is what someone sees who looks at the front.
+        let optics = arguments.refract.map_or(Optics::Reflect, Optics::Refract);
+        let environment = Environment::new(image, sampler(arguments), axes(front, up), optics);
+        material.environment = Some(Arc::new(environment));
     }
     Ok(material)
 }

@@ -131,7 +131,7 @@ impl RenderOptions {
         {
             return Err(Error::invalid("light", to_light, "a finite direction, not zero"));
         }
-        if let Some(Optics::Refract(index)) = self.material.environment.as_ref().map(|all| all.optics)
+        if let Some(Optics::Refract(index)) = self.material.environment.as_ref().map(|all| all.optics())
             && !(index.is_finite() && index > 0.0)
         {
             return Err(Error::invalid("index of refraction", index, "a finite number greater than 0"));

@@ -5,6 +5,7 @@ use crate::raster::SamplePlace;
 use crate::sampling::SampleTable;
 use crate::setup::{View, VisibleSplat, shading_normal, splat_color};
 use crate::shade::{Shaded, SplatShader};
+use crate::texture::ImageLookup;
 use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading, srgb};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
@@ -60,7 +61,7 @@ struct Sums {
 }
 
 impl<'a> PixelResolver<'a> {
-    /// A resolver for a frame with these splats and what their fragments share, both by rank.
+    /// A resolver for a frame with these splats and what their fragments share, both by rank; `images` looks up the material's.
     pub fn new(
         cloud: &'a Cloud,
         camera: &Camera,
@@ -68,6 +69,7 @@ impl<'a> PixelResolver<'a> {
         view: &'a View,
         splats: &'a [VisibleSplat],
         surfaces: &'a [SplatSurface],
+        images: &'a dyn ImageLookup,
     ) -> Self {
         let material = &options.material;
         let needs_shader = material.varies_by_pixel() || (options.aovs.albedo && !material.is_plain());
@@ -81,7 +83,7 @@ impl<'a> PixelResolver<'a> {
             background: options.background,
             resolver: Resolver::new(options.resolve),
             surfaces,
-            shader: needs_shader.then(|| SplatShader::new(cloud, view, options)),
+            shader: needs_shader.then(|| SplatShader::new(cloud, view, options, images)),
             shaded: Vec::new(),
             splats,
             sums: Sums::default(),

@@ -3,6 +3,7 @@
 use crate::pixel::PixelResolver;
 use crate::raster::{Rasterizer, SamplePlace};
 use crate::setup::{SetUp, View, VisibleSplat, set_up};
+use crate::texture::ScalarLookup;
 use crate::{Camera, Cloud, Error, Film, PixelRect, RenderOptions};
 use splat_abuffer::{Fragment, MAX_RANK, TileBuffer};
 use std::collections::BTreeMap;
@@ -70,6 +71,7 @@ pub fn render(
             &frame.view,
             &frame.set_up.splats,
             &frame.set_up.surfaces,
+            &ScalarLookup,
         ),
         buffer: TileBuffer::default(),
         budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,

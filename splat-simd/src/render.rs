@@ -15,6 +15,7 @@ use splat_core::raster::SamplePlace;
 use splat_core::render::{Frame, Tiles, quarters};
 use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
 use splat_core::shade::SplatShader;
+use splat_core::texture::ScalarLookup;
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -249,7 +250,15 @@ impl<'a> Picture<'a> {
 
     fn pixels(&self) -> PixelResolver<'_> {
         let Frame { view, set_up, .. } = self.frame;
-        PixelResolver::new(self.cloud, self.camera, self.options, view, &set_up.splats, &set_up.surfaces)
+        PixelResolver::new(
+            self.cloud,
+            self.camera,
+            self.options,
+            view,
+            &set_up.splats,
+            &set_up.surfaces,
+            &ScalarLookup,
+        )
     }
 
     /// Renders a tile.
@@ -358,7 +367,9 @@ impl<'a> Picture<'a> {
     fn shader(&self) -> Option<TileShader<'_>> {
         let Frame { view, set_up, .. } = self.frame;
         let by_pixel = self.options.material.varies_by_pixel();
-        by_pixel.then(|| TileShader::new(SplatShader::new(self.cloud, view, self.options), &set_up.splats))
+        by_pixel.then(|| {
+            TileShader::new(SplatShader::new(self.cloud, view, self.options, &ScalarLookup), &set_up.splats)
+        })
     }
 
     fn raster_frame(&self) -> RasterFrame<'_> {

@@ -105,12 +105,7 @@ fn sky() -> Pyramid {
 }
 
 fn surroundings(optics: Optics) -> Material {
-    let environment = Environment {
-        image: Arc::new(sky()),
-        sampler: Sampler::default(),
-        world_to_image: DAffine3::IDENTITY,
-        optics,
-    };
+    let environment = Environment::new(Arc::new(sky()), Sampler::default(), DMat3::IDENTITY, optics);
     Material { environment: Some(Arc::new(environment)), ..Material::default() }
 }
 
@@ -209,7 +204,7 @@ fn an_image_stands_upright_and_is_blurred_as_the_pixels_are_wide() {
         pyramid: Arc::new(Pyramid::new([64, 64], 1, Texels::F32(checks()), [Wrap::Repeat; 2]).unwrap()),
         ..image
     };
-    for (pixel, color) in inner(&cloud, &camera, &options(textured(Texture::Image(repeated.clone())))) {
+    for (pixel, color) in inner(&cloud, &camera, &options(textured(Texture::Image(repeated)))) {
         assert!(color.iter().all(|value| (value - 0.5).abs() < 0.01), "{color:?} at {pixel}");
     }
 }
@@ -424,8 +419,7 @@ fn a_frame_of_axes_is_no_mirror() {
     let camera = pinhole(64, 64, 100.0);
     let cloud = plane(DVec3::new(0.0, 0.0, 4.0), 20.0, 0.16, 1.0);
     let turn = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
-    let environment = surroundings(Optics::Reflect).environment.unwrap();
-    let environment = Environment { world_to_image: DAffine3::from_mat3(turn), ..(*environment).clone() };
+    let environment = Environment::new(Arc::new(sky()), Sampler::default(), turn, Optics::Reflect);
     let material = Material { environment: Some(Arc::new(environment)), ..Material::default() };
     let normal = cloud.normals[0].as_dvec3();
     for (pixel, color) in inner(&cloud, &camera, &options(material)) {

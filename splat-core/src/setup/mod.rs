@@ -29,6 +29,7 @@ pub use view::View;
 use crate::evaluate::SplatConstants;
 use crate::options::Shading;
 use crate::shade::SplatShader;
+use crate::texture::ScalarLookup;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
 use glam::DVec3;
 use margin::Margin;
@@ -428,7 +429,7 @@ fn surface(
         let color = splat_color(cloud, index, options.shading);
         finished_color(color.map(|value| value * light), options)
     } else {
-        SplatShader::new(cloud, view, options).whole(index, splat, exact).color
+        SplatShader::new(cloud, view, options, &ScalarLookup).whole(index, splat, exact).color
     };
     let opacity = cloud.opacities.as_ref().map_or(1.0, |opacities| opacities[index].clamp(0.0, 1.0));
     SplatSurface { color, opacity, interval: depth_interval(splat, view, options) }

@@ -3,11 +3,13 @@
 
 mod splat;
 
-pub use splat::{Shaded, ShadedSplat, SplatShader};
+pub use splat::{Shaded, ShadedSplat, Sight, SplatShader};
 
-use crate::texture::textures::{Mapping, SurfacePoint};
-use crate::texture::{Pyramid, RayDifferential, Sampler, SpacePoint, SphericalMapping, Texture};
-use glam::{DAffine3, DVec3};
+use crate::texture::{
+    ImageTexture, Mapping, Pyramid, RayDifferential, Sampler, SpacePoint, SphericalMapping, Surface,
+    SurfacePoint, Texture,
+};
+use glam::{DAffine3, DMat3, DVec3};
 use std::fmt;
 use std::sync::Arc;
 
@@ -58,6 +60,15 @@ impl Material {
         self.texture.is_none() && self.environment.is_none() && self.shader.is_none()
     }
 
+    /// The only image that decides what colour a splat has, if that is so.
+    pub fn image(&self) -> Option<&ImageTexture> {
+        match (self.environment.as_deref(), self.texture.as_deref()) {
+            (Some(environment), _) => Some(environment.image()),
+            (None, Some(Texture::Image(image))) => Some(image),
+            _ => None,
+        }
+    }
+
     /// Whether a splat's colour differs from pixel to pixel.
     pub fn varies_by_pixel(&self) -> bool {
         !self.is_plain() && self.detail == Detail::Fragment
@@ -101,26 +112,35 @@ pub enum Optics {
 /// Surroundings, infinitely far away: an image of all directions, by longitude and latitude.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    /// The image; its upper edge is straight up.
-    pub image: Arc<Pyramid>,
-    /// How it is filtered.
-    pub sampler: Sampler,
-    /// From world directions to those of the image, whose up is +z, and whose middle column is -x.
-    pub world_to_image: DAffine3,
-    /// How it is seen.
-    pub optics: Optics,
+    image: ImageTexture,
+    optics: Optics,
 }
 
 impl Environment {
-    /// The linear colour seen from a point with this unit normal by the viewer's rays. `back` if they meet the inside.
-    fn color(&self, point: DVec3, normal: DVec3, back: bool, rays: &RayDifferential) -> [f32; 3] {
+    /// Surroundings seen by `optics` in an image whose upper edge is straight up. `world_to_image` turns the world's
+    /// directions to those of the image, whose up is +z, and whose middle column is -x.
+    pub fn new(image: Arc<Pyramid>, sampler: Sampler, world_to_image: DMat3, optics: Optics) -> Self {
+        let world_to_texture = DAffine3::from_mat3(world_to_image);
+        let mapping = Mapping::Spherical(SphericalMapping { world_to_texture });
+        Self { image: ImageTexture { pyramid: image, sampler, mapping }, optics }
+    }
+
+    /// How they are seen.
+    pub fn optics(&self) -> Optics {
+        self.optics
+    }
+
+    /// The image, whose points are directions.
+    pub fn image(&self) -> &ImageTexture {
+        &self.image
+    }
+
+    /// The direction in which the viewer's rays go on from a point with this unit normal. `back` if they meet the inside.
+    fn direction(&self, point: DVec3, normal: DVec3, back: bool, rays: &RayDifferential) -> SurfacePoint {
         // Of a splat no more is known than its plane.
-        let surface = crate::texture::Surface {
-            position: point,
-            normal,
-            position_derivatives: [DVec3::ZERO; 2],
-            normal_derivatives: [DVec3::ZERO; 2],
-        };
+        let flat = [DVec3::ZERO; 2];
+        let surface =
+            Surface { position: point, normal, position_derivatives: flat, normal_derivatives: flat };
         let differentials = surface.differentials(rays);
         let seen = match self.optics {
             Optics::Reflect => None,
@@ -129,17 +149,8 @@ impl Environment {
             }
         };
         let seen = seen.unwrap_or_else(|| rays.reflected(&surface, &differentials));
-        let direction = seen.ray.direction;
-        let image = crate::texture::textures::ImageTexture {
-            pyramid: self.image.clone(),
-            sampler: self.sampler,
-            mapping: Mapping::Spherical(SphericalMapping { world_to_texture: self.world_to_image }),
-        };
-        let space = SpacePoint {
-            point: direction,
-            dx: seen.next[0].direction - direction,
-            dy: seen.next[1].direction - direction,
-        };
-        image.color(&SurfacePoint { space, ..SurfacePoint::default() })
+        let point = seen.ray.direction;
+        let [dx, dy] = seen.next.map(|next| next.direction - point);
+        SurfacePoint { space: SpacePoint { point, dx, dy }, ..SurfacePoint::default() }
     }
 }

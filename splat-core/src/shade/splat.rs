@@ -1,13 +1,15 @@
 //! The colour of a splat in a pixel.
 
-use super::{Detail, Environment, Material, ShadedPoint};
+use super::{Detail, Material, ShadedPoint};
 use crate::evaluate::SplatConstants;
 use crate::setup::{
-    CameraSplat, View, camera_splat, project, rotation, shading_normal, splat_color, world_axes,
+    CameraSplat, Extent, View, camera_splat, finished_color, light, project, rotation, shading_normal,
+    splat_color, world_axes,
 };
 use crate::texture::filter::KERNEL_VARIANCE;
-use crate::texture::textures::SurfacePoint;
-use crate::texture::{PixelDerivatives, Ray, RayDifferential, SpacePoint, TexturePoint};
+use crate::texture::{
+    ImageLookup, PixelDerivatives, Ray, RayDifferential, SpacePoint, SurfacePoint, TexturePoint,
+};
 use crate::{Cloud, RenderOptions};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
@@ -24,6 +26,7 @@ pub struct SplatShader<'a> {
     view: &'a View,
     options: &'a RenderOptions,
     to_world: DMat3,
+    images: &'a dyn ImageLookup,
 }
 
 /// A splat, ready to be shaded in any pixel.
@@ -48,6 +51,24 @@ pub struct ShadedSplat {
     variance: f64,
 }
 
+/// What a pixel sees of a splat.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight {
+    /// Where on the splat.
+    point: SurfacePoint,
+    /// By which rays, if that matters.
+    ray: Option<RayDifferential>,
+    /// The directions in which they go on, if surroundings are seen.
+    surroundings: Option<SurfacePoint>,
+}
+
+impl Sight {
+    /// The point at which [`Material::image`] is looked up.
+    pub fn image_point(&self) -> &SurfacePoint {
+        self.surroundings.as_ref().unwrap_or(&self.point)
+    }
+}
+
 /// Colours of a splat, linear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shaded {
@@ -58,9 +79,14 @@ pub struct Shaded {
 }
 
 impl<'a> SplatShader<'a> {
-    /// The shader of a frame.
-    pub fn new(cloud: &'a Cloud, view: &'a View, options: &'a RenderOptions) -> Self {
-        Self { cloud, view, options, to_world: view.linear.inverse() }
+    /// The shader of a frame, which has its images looked up by `images`.
+    pub fn new(
+        cloud: &'a Cloud,
+        view: &'a View,
+        options: &'a RenderOptions,
+        images: &'a dyn ImageLookup,
+    ) -> Self {
+        Self { cloud, view, options, to_world: view.linear.inverse(), images }
     }
 
     /// The splat with this index in the cloud; `None` if it is seen edge-on.
@@ -73,16 +99,21 @@ impl<'a> SplatShader<'a> {
     /// The colours of a splat as a whole: at its reference point, averaged over a pixel there.
     pub(crate) fn whole(&self, index: usize, splat: &CameraSplat, exact: &SplatConstants<f64>) -> Shaded {
         let prepared = self.prepare(index, splat, exact);
-        self.shade_at(&prepared, DVec2::ZERO, exact.pixel())
+        self.shaded(&prepared, &self.sight_at(&prepared, DVec2::ZERO, exact.pixel()))
     }
 
     /// The colours of a splat in the pixel (x, y).
     pub fn shade(&self, splat: &ShadedSplat, x: i32, y: i32) -> Shaded {
+        self.shaded(splat, &self.sight(splat, x, y))
+    }
+
+    /// What is seen of a splat in the pixel (x, y).
+    pub fn sight(&self, splat: &ShadedSplat, x: i32, y: i32) -> Sight {
         if splat.is_whole {
-            return self.shade_at(splat, DVec2::ZERO, splat.exact.pixel());
+            return self.sight_at(splat, DVec2::ZERO, splat.exact.pixel());
         }
         let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        self.shade_at(splat, pixel - splat.exact.pixel(), pixel)
+        self.sight_at(splat, pixel - splat.exact.pixel(), pixel)
     }
 
     fn prepare(&self, index: usize, splat: &CameraSplat, exact: &SplatConstants<f64>) -> ShadedSplat {
@@ -93,7 +124,7 @@ impl<'a> SplatShader<'a> {
         let coordinates = cloud.texture_coordinates.as_ref().map(|all| all[index]).unwrap_or_default();
         let [s1, s2] = [coordinates.per_u, coordinates.per_v].map(|axis| axis.as_dvec2());
         let depth = splat.center.z;
-        let blur = view.circle_of_confusion(crate::setup::Extent { min: depth, max: depth });
+        let blur = view.circle_of_confusion(Extent { min: depth, max: depth });
         let blur = blur * view.pixel_scale.max_element();
         // |J|^2, the sum of its squares, by the rows (p, q) and (m, 0) of `project`.
         let (q, m) = (1.0 / exact.a1, 1.0 / exact.b[0]);
@@ -115,49 +146,49 @@ impl<'a> SplatShader<'a> {
         }
     }
 
-    fn shade_at(&self, splat: &ShadedSplat, offset: DVec2, pixel: DVec2) -> Shaded {
-        let material = &self.options.material;
-        let at = splat.surface_point(offset);
-        let albedo = match &material.texture {
-            Some(texture) => texture.color(&at),
+    fn sight_at(&self, splat: &ShadedSplat, offset: DVec2, pixel: DVec2) -> Sight {
+        let Material { environment, shader, .. } = &self.options.material;
+        let point = splat.surface_point(offset);
+        let ray = (environment.is_some() || shader.is_some()).then(|| RayDifferential {
+            ray: self.ray(pixel),
+            next: [self.ray(pixel + DVec2::X), self.ray(pixel + DVec2::Y)],
+        });
+        let surroundings = environment.as_ref().zip(ray.as_ref()).map(|(environment, ray)| {
+            environment.direction(point.space.point, splat.normal, splat.splat.back, ray)
+        });
+        Sight { point, ray, surroundings }
+    }
+
+    fn shaded(&self, splat: &ShadedSplat, sight: &Sight) -> Shaded {
+        let Material { texture, environment, .. } = &self.options.material;
+        let albedo = match texture {
+            Some(texture) => texture.color(&sight.point, self.images),
             None => splat_color(self.cloud, splat.index, self.options.shading),
         };
-        let lit = self.lit(splat, albedo);
-        let color = self.surroundings(material, splat, &at, pixel, lit);
-        Shaded { albedo, color: crate::setup::finished_color(color, self.options) }
+        let seen = environment.as_ref().zip(sight.surroundings.as_ref());
+        let seen = seen.map(|(environment, at)| environment.image().color(at, self.images));
+        Shaded { albedo, color: self.finished(splat, sight, seen.unwrap_or_else(|| self.lit(splat, albedo))) }
+    }
+
+    /// The colour of a splat given that of [`Material::image`] at [`Sight::image_point`].
+    pub fn color_by_image(&self, splat: &ShadedSplat, sight: &Sight, image: [f32; 3]) -> [f32; 3] {
+        let color = if sight.surroundings.is_some() { image } else { self.lit(splat, image) };
+        self.finished(splat, sight, color)
     }
 
     /// The colour under the light.
     fn lit(&self, splat: &ShadedSplat, albedo: [f32; 3]) -> [f32; 3] {
-        let light = crate::setup::light(&splat.splat, || splat.normal, self.view, self.options) as f32;
+        let light = light(&splat.splat, || splat.normal, self.view, self.options) as f32;
         albedo.map(|value| value * light)
     }
 
-    /// The colour with what is seen of the surroundings, and after the caller's shader.
-    fn surroundings(
-        &self,
-        Material { environment, shader, .. }: &Material,
-        splat: &ShadedSplat,
-        at: &SurfacePoint,
-        pixel: DVec2,
-        mut color: [f32; 3],
-    ) -> [f32; 3] {
-        if environment.is_none() && shader.is_none() {
-            return color;
-        }
-        let ray = RayDifferential {
-            ray: self.ray(pixel),
-            next: [self.ray(pixel + DVec2::X), self.ray(pixel + DVec2::Y)],
-        };
-        if let Some(environment) = environment {
-            let environment: &Environment = environment;
-            color = environment.color(at.space.point, splat.normal, splat.splat.back, &ray);
-        }
-        if let Some(shader) = shader {
+    /// After the caller's shader, in the resolve's terms.
+    fn finished(&self, splat: &ShadedSplat, sight: &Sight, mut color: [f32; 3]) -> [f32; 3] {
+        if let (Some(shader), Some(ray)) = (&self.options.material.shader, sight.ray) {
             let (normal, back, index) = (splat.normal, splat.splat.back, splat.index);
-            color = shader(&ShadedPoint { surface: *at, normal, back, ray, index }, color);
+            color = shader(&ShadedPoint { surface: sight.point, normal, back, ray, index }, color);
         }
-        color
+        finished_color(color, self.options)
     }
 
     /// The ray through a place of the picture and the middle of the lens, in the world.

@@ -20,4 +20,6 @@ pub use mapping::{
     TexturePoint, UvMapping,
 };
 pub use pyramid::{Pyramid, PyramidError, Texels, Wrap};
-pub use textures::{FunctionTexture, ImageTexture, Mapping, Placement, SurfacePoint, Texture};
+pub use textures::{
+    FunctionTexture, ImageLookup, ImageTexture, Mapping, Placement, ScalarLookup, SurfacePoint, Texture,
+};

@@ -7,7 +7,7 @@ use super::mapping::{
     CylindricalMapping, PlanarMapping, SolidMapping, SpacePoint, SphericalMapping, TexturePoint, UvMapping,
 };
 use super::pyramid::Pyramid;
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 use std::fmt;
 use std::sync::Arc;
 
@@ -70,18 +70,39 @@ pub struct ImageTexture {
 }
 
 impl ImageTexture {
-    /// The mean linear colour around a point.
-    pub fn color(&self, at: &SurfacePoint) -> [f32; 3] {
-        let [red, green, blue, _] = self.texels(&self.mapping.map(at));
+    /// Where the image is looked up for a point: its rows run downwards, t upwards.
+    pub fn place(&self, at: &SurfacePoint) -> (Vec2, Footprint) {
+        let TexturePoint { st, derivatives } = self.mapping.map(at);
+        let downwards = Vec2::new(1.0, -1.0);
+        let semi_axes = derivatives.semi_axes().semi_axes.map(|axis| axis * downwards);
+        (DVec2::new(st.x, 1.0 - st.y).as_vec2(), Footprint { semi_axes })
+    }
+
+    /// The colour that a looked up texel stands for.
+    pub fn color_of(&self, [red, green, blue, _]: [f32; 4]) -> [f32; 3] {
         if self.pyramid.channels() < 3 { [red; 3] } else { [red, green, blue] }
     }
 
-    /// The image around texture coordinates; its rows run downwards, t upwards.
-    fn texels(&self, TexturePoint { st, derivatives }: &TexturePoint) -> [f32; 4] {
-        let Footprint { semi_axes } = derivatives.semi_axes();
-        let downwards = glam::Vec2::new(1.0, -1.0);
-        let footprint = Footprint { semi_axes: semi_axes.map(|axis| axis * downwards) };
-        self.sampler.lookup(&self.pyramid, DVec2::new(st.x, 1.0 - st.y).as_vec2(), &footprint)
+    /// The mean linear colour around a point.
+    pub fn color(&self, at: &SurfacePoint, images: &dyn ImageLookup) -> [f32; 3] {
+        let (st, footprint) = self.place(at);
+        self.color_of(images.lookup(self, st, &footprint))
+    }
+}
+
+/// Whoever averages images over footprints: the filters of this crate, or faster ones.
+pub trait ImageLookup: Sync + fmt::Debug {
+    /// The mean of an image around `st`, as [`Sampler::lookup`] gives it.
+    fn lookup(&self, image: &ImageTexture, st: Vec2, footprint: &Footprint) -> [f32; 4];
+}
+
+/// The filters of this crate.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ScalarLookup;
+
+impl ImageLookup for ScalarLookup {
+    fn lookup(&self, image: &ImageTexture, st: Vec2, footprint: &Footprint) -> [f32; 4] {
+        image.sampler.lookup(&image.pyramid, st, footprint)
     }
 }
 
@@ -145,13 +166,14 @@ impl Texture {
     ///
     /// A product of means is not the mean of products: of what two factors share in detail that the footprint is too large
     /// for, nothing is left.
-    pub fn color(&self, at: &SurfacePoint) -> [f32; 3] {
+    pub fn color(&self, at: &SurfacePoint, images: &dyn ImageLookup) -> [f32; 3] {
+        let color = |texture: &Self| texture.color(at, images);
         match self {
-            Self::Constant(color) => *color,
-            Self::Image(image) => image.color(at),
+            Self::Constant(constant) => *constant,
+            Self::Image(image) => image.color(at, images),
             Self::Function(function) => function.color(at),
-            Self::Scale(first, second) => product(first.color(at), second.color(at)),
-            Self::Mix(from, to, amount) => mix(from.color(at), to.color(at), amount.color(at)),
+            Self::Scale(first, second) => product(color(first), color(second)),
+            Self::Mix(from, to, amount) => mix(color(from), color(to), color(amount)),
         }
     }
 }
