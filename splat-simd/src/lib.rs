@@ -14,6 +14,7 @@ mod records;
 mod render;
 mod resolve;
 mod samples;
+pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};
 pub use lanes::Level;

@@ -487,3 +487,14 @@ pub const SPACING_SCATTER: f64 = 0.12;
 /// 4 * 1000 random candidates have a standard deviation of 1.6 % (3.2 %), of which the elimination evens out a part.
 /// Measured: 1.8 %.
 pub const EVEN_SHARE: f64 = 0.05;
+
+/// TEMP
+pub fn lanes(anisotropy: f64) -> f64 {
+    (32.0 + 8.0 * anisotropy) / 16_777_216.0
+}
+/// TEMP
+pub const LANES_DECIDE: f64 = 2e-6;
+/// TEMP
+pub const LANES_CONSTANT: f64 = 5e-6;
+/// TEMP
+pub const LANES_RANGE: f64 = 5e-6;
