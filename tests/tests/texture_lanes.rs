@@ -3,7 +3,9 @@
 use glam::{DVec2, Vec2};
 use proptest::prelude::*;
 use splat_core::texture::filter::{Average, honoured_anisotropy};
-use splat_core::texture::{Filter, Footprint, Magnification, Probes, Pyramid, Quality, Sampler, Texels, Wrap};
+use splat_core::texture::{
+    Filter, Footprint, Magnification, Probes, Pyramid, Quality, Sampler, Texels, Wrap,
+};
 use splat_simd::Level;
 use splat_simd::texture::{LanePyramid, LaneSampler, Lookup as Request};
 use splat_tests::random::Random;
@@ -164,7 +166,8 @@ fn a_constant_stays_itself() {
         for channels in 1..=4 {
             let texels = Texels::F32(vec![0.7; size[0] as usize * size[1] as usize * channels]);
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-                let lanes = LanePyramid::new(&Pyramid::new(size, channels, texels.clone(), [wrap; 2]).unwrap());
+                let lanes =
+                    LanePyramid::new(&Pyramid::new(size, channels, texels.clone(), [wrap; 2]).unwrap());
                 for _ in 0..20 {
                     let anisotropy = random.log_range(1.0, 100.0);
                     let lookup = request(&Lookup::random(&mut random, [0.1, 30.0], anisotropy), size);
@@ -175,7 +178,10 @@ fn a_constant_stays_itself() {
                             for (channel, value) in found.into_iter().enumerate() {
                                 let expected = if channel < channels { 0.7 } else { 0.0 };
                                 let error = f64::from((value - expected).abs());
-                                assert!(error <= tol::LANES_CONSTANT, "{filter:?} {size:?} {lookup:?}: {found:?}");
+                                assert!(
+                                    error <= tol::LANES_CONSTANT,
+                                    "{filter:?} {size:?} {lookup:?}: {found:?}"
+                                );
                             }
                         }
                     }
