@@ -46,11 +46,10 @@ pub fn options(options: &RenderOptions) -> String {
         }
     };
     let shading = match options.shading {
-        Shading::Color => "color".to_owned(),
-        Shading::Headlight => "headlight".to_owned(),
-        Shading::Lambert { to_light } => {
-            format!("lambert --light {},{},{}", to_light.x, to_light.y, to_light.z)
-        }
+        Shading::Color => "color",
+        Shading::Headlight => "headlight",
+        // Where the light is depends on what is up: whoever knows adds it.
+        Shading::Lambert { .. } => "lambert",
     };
     let background = match options.background {
         None => "none".to_owned(),

@@ -7,6 +7,7 @@ use crate::engine::Engine;
 use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
+use crate::values::ViewDirection;
 use crate::{describe, inputs, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
@@ -56,7 +57,10 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-    let in_words = describe::options(&options) + &material::describe(&arguments.material);
+    let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
+    if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
+        in_words += &format!(" --light {azimuth},{elevation}");
+    }
     let metadata = Metadata {
         input_hash: Some(hashes.join(" ")),
         options: Some(in_words),

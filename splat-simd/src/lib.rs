@@ -15,6 +15,7 @@ mod render;
 mod resolve;
 mod samples;
 mod shade;
+pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};
 pub use lanes::Level;

@@ -205,19 +205,17 @@ impl RecordBuffer {
         self.ranks.len()
     }
 
-    /// Gives the splats that have records in a cell the colours that `color` has for their number and rank, if any.
-    pub fn recolor(&mut self, cell: usize, mut color: impl FnMut(usize, u32) -> Option<[f32; 3]>) {
-        for side in 0..self.sides {
-            let ends = self.lists.as_flattened();
-            let list = side * self.groups * PLACES + cell;
-            let start = if list == 0 { 0 } else { ends[list - 1] };
-            for entry in &self.entries[start as usize..ends[list] as usize] {
-                let number = entry.splat.number();
-                if let Some(color) = color(number, self.ranks[number]) {
-                    self.surfaces[number].color = color;
-                }
-            }
-        }
+    /// The number and the rank of the splat of each record of a cell.
+    pub fn splats_of(&self, cell: usize) -> impl Iterator<Item = (usize, u32)> {
+        self.cell(cell).into_iter().flatten().map(|entry| {
+            let number = entry.splat.number();
+            (number, self.ranks[number])
+        })
+    }
+
+    /// Gives a splat, by its number in the region, another colour.
+    pub fn recolor(&mut self, number: usize, color: [f32; 3]) {
+        self.surfaces[number].color = color;
     }
 
     /// The record of an entry.

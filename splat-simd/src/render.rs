@@ -7,7 +7,7 @@ use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::ResolveJob;
 use crate::samples::LaneSamples;
-use crate::shade::TileShader;
+use crate::shade::{LaneImages, TileShader};
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
 use splat_core::pixel::PixelResolver;
@@ -15,7 +15,6 @@ use splat_core::raster::SamplePlace;
 use splat_core::render::{Frame, Tiles, quarters};
 use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
 use splat_core::shade::SplatShader;
-use splat_core::texture::ScalarLookup;
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -40,6 +39,8 @@ pub struct Renderer {
     workers: Mutex<Vec<Worker>>,
     /// That of the last picture, kept for its memory.
     set_up: SetUp,
+    /// Those of the last picture's material.
+    images: LaneImages,
 }
 
 /// The buffers of a thread.
@@ -67,6 +68,7 @@ struct Picture<'a> {
     samples: LaneSamples,
     /// For large circles of confusion.
     lattice: Option<Lattice>,
+    images: &'a LaneImages,
     level: Level,
 }
 
@@ -91,7 +93,13 @@ impl Renderer {
     pub fn new(threads: usize, level: Level) -> Result<Self, Error> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let threads = pool.map_err(|error| Error::invalid("threads", error, "fewer threads"))?;
-        Ok(Self { level, threads, workers: Mutex::default(), set_up: SetUp::default() })
+        Ok(Self {
+            level,
+            threads,
+            workers: Mutex::default(),
+            set_up: SetUp::default(),
+            images: LaneImages::new(level),
+        })
     }
 
     /// Number of threads.
@@ -121,7 +129,7 @@ impl Renderer {
         let start = Instant::now();
         let tiles = Tiles::new(&frame.set_up.splats, &window);
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture::new(cloud, camera, options, &frame, self.level);
+        let picture = Picture::new(cloud, camera, options, &frame, &self.images, self.level);
         let mut film = picture.pixels().empty_film(
             [camera.width, camera.height],
             window,
@@ -165,7 +173,7 @@ impl Renderer {
         let start = Instant::now();
         let tiles = Tiles::new(&frame.set_up.splats, &frame.view.window);
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture::new(cloud, camera, options, &frame, self.level);
+        let picture = Picture::new(cloud, camera, options, &frame, &self.images, self.level);
         let counts: Vec<Statistics> = self.threads.install(|| {
             let tiles = (0..tiles.len()).into_par_iter().map(|tile| tiles.get(tile));
             tiles
@@ -182,6 +190,7 @@ impl Renderer {
     /// What is ready before the first fragment; in the memory of the last picture.
     fn frame(&mut self, cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<Frame, Error> {
         let memory = std::mem::take(&mut self.set_up);
+        self.images.set(&options.material);
         let set_up = |cloud: &_, view: &_, options: &_| set_up(cloud, view, options, memory);
         self.threads.install(|| Frame::new(cloud, camera, options, set_up))
     }
@@ -239,13 +248,14 @@ impl<'a> Picture<'a> {
         camera: &'a Camera,
         options: &'a RenderOptions,
         frame: &'a Frame,
+        images: &'a LaneImages,
         level: Level,
     ) -> Self {
         let samples = LaneSamples::new(&frame.rasterizer);
         // Of a cell of a lattice every sample lies in another pixel.
         let by_pixel = options.material.varies_by_pixel();
         let lattice = Lattice::new(&frame.rasterizer, &frame.view).filter(|_| !by_pixel);
-        Self { cloud, camera, options, frame, samples, lattice, level }
+        Self { cloud, camera, options, frame, samples, lattice, images, level }
     }
 
     fn pixels(&self) -> PixelResolver<'_> {
@@ -257,7 +267,7 @@ impl<'a> Picture<'a> {
             view,
             &set_up.splats,
             &set_up.surfaces,
-            &ScalarLookup,
+            self.images,
         )
     }
 
@@ -368,7 +378,8 @@ impl<'a> Picture<'a> {
         let Frame { view, set_up, .. } = self.frame;
         let by_pixel = self.options.material.varies_by_pixel();
         by_pixel.then(|| {
-            TileShader::new(SplatShader::new(self.cloud, view, self.options, &ScalarLookup), &set_up.splats)
+            let shader = SplatShader::new(self.cloud, view, self.options, self.images);
+            TileShader::new(shader, &set_up.splats, &self.options.material, self.images)
         })
     }
 

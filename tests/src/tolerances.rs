@@ -504,3 +504,17 @@ pub const SKY_TEXEL: f64 = 0.015;
 /// radius) times the part that the pixel has, plus a semi-axis of 1/sqrt(KERNEL_VARIANCE) = 2.71 times the root of the
 /// other part: at most sqrt(2^2 + 2.71^2) with equality where both have half.
 pub const LOOKUP_REACH: f64 = 3.4;
+/// TEMP
+pub fn lanes(anisotropy: f64) -> f64 {
+    (32.0 + 8.0 * anisotropy) / 16_777_216.0
+}
+/// TEMP
+pub const LANES_DECIDE: f64 = 2e-6;
+/// TEMP
+pub const LANES_CONSTANT: f64 = 5e-6;
+/// TEMP
+pub const LANES_RANGE: f64 = 5e-6;
+
+/// Colours of image textures in both engines, for texels in [0, 1]: a lookup by lanes and a scalar one are within some 16
+/// roundings of 2^-24 of each other where both decide for the same level of the pyramid, and so is a mean of them.
+pub const ENGINES_COLORS: f64 = 2e-6;

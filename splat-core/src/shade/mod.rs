@@ -69,6 +69,16 @@ impl Material {
         }
     }
 
+    /// All images.
+    pub fn images(&self) -> Vec<&ImageTexture> {
+        let mut images = Vec::new();
+        if let Some(texture) = &self.texture {
+            texture.collect_images(&mut images);
+        }
+        images.extend(self.environment.as_deref().map(Environment::image));
+        images
+    }
+
     /// Whether a splat's colour differs from pixel to pixel.
     pub fn varies_by_pixel(&self) -> bool {
         !self.is_plain() && self.detail == Detail::Fragment
@@ -118,9 +128,11 @@ pub struct Environment {
 
 impl Environment {
     /// Surroundings seen by `optics` in an image whose upper edge is straight up. `world_to_image` turns the world's
-    /// directions to those of the image, whose up is +z, and whose middle column is -x.
+    /// directions to those of the image, whose up is +z, and whose middle column is -x; who looks there has +y at the right.
     pub fn new(image: Arc<Pyramid>, sampler: Sampler, world_to_image: DMat3, optics: Optics) -> Self {
-        let world_to_texture = DAffine3::from_mat3(world_to_image);
+        // A texture's longitude runs to the right as a globe shows it from outside; this is seen from inside.
+        let inside = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let world_to_texture = DAffine3::from_mat3(inside * world_to_image);
         let mapping = Mapping::Spherical(SphericalMapping { world_to_texture });
         Self { image: ImageTexture { pyramid: image, sampler, mapping }, optics }
     }

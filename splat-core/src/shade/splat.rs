@@ -10,11 +10,14 @@ use crate::texture::filter::KERNEL_VARIANCE;
 use crate::texture::{
     ImageLookup, PixelDerivatives, Ray, RayDifferential, SpacePoint, SurfacePoint, TexturePoint,
 };
-use crate::{Cloud, RenderOptions};
+use crate::{Cloud, RenderOptions, Shapes};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 /// Splats with less than this, in pixels, for a sigma have one colour for all pixels.
 const SMALL: f64 = 0.5;
+
+/// Circles of confusion of a larger radius, in pixels, are as good as this.
+const LARGEST_BLUR: f64 = 1e6;
 
 /// The least g of the centre of a pixel at which a splat's plane can be looked up: nearer to the horizon, the whole splat is.
 const LEAST_G: f64 = 1.0 / 16.0;
@@ -122,10 +125,14 @@ impl<'a> SplatShader<'a> {
         let unit_normal = cloud.normals[index].as_dvec3().normalize();
         let [t1, t2] = world_axes(cloud, index, unit_normal);
         let coordinates = cloud.texture_coordinates.as_ref().map(|all| all[index]).unwrap_or_default();
-        let [s1, s2] = [coordinates.per_u, coordinates.per_v].map(|axis| axis.as_dvec2());
+        // The axes of a round splat are nobody's: what is said about them means nothing.
+        let known = matches!(cloud.shapes, Shapes::Ellipses(_));
+        let [s1, s2] = [coordinates.per_u, coordinates.per_v]
+            .map(|axis| if known { axis.as_dvec2() } else { DVec2::ZERO });
         let depth = splat.center.z;
         let blur = view.circle_of_confusion(Extent { min: depth, max: depth });
-        let blur = blur * view.pixel_scale.max_element();
+        // Infinite in the plane of the lens.
+        let blur = (blur * view.pixel_scale.max_element()).min(LARGEST_BLUR);
         // |J|^2, the sum of its squares, by the rows (p, q) and (m, 0) of `project`.
         let (q, m) = (1.0 / exact.a1, 1.0 / exact.b[0]);
         let p = exact.b[1] * q * m;
@@ -159,7 +166,8 @@ impl<'a> SplatShader<'a> {
         Sight { point, ray, surroundings }
     }
 
-    fn shaded(&self, splat: &ShadedSplat, sight: &Sight) -> Shaded {
+    /// The colours of a splat given what is seen of it.
+    pub fn shaded(&self, splat: &ShadedSplat, sight: &Sight) -> Shaded {
         let Material { texture, environment, .. } = &self.options.material;
         let albedo = match texture {
             Some(texture) => texture.color(&sight.point, self.images),
@@ -187,6 +195,8 @@ impl<'a> SplatShader<'a> {
         if let (Some(shader), Some(ray)) = (&self.options.material.shader, sight.ray) {
             let (normal, back, index) = (splat.normal, splat.splat.back, splat.index);
             color = shader(&ShadedPoint { surface: sight.point, normal, back, ray, index }, color);
+            // No caller's mistake reaches the picture.
+            color = color.map(|value| if value.is_nan() { 0.0 } else { value });
         }
         finished_color(color, self.options)
     }

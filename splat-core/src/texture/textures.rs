@@ -178,6 +178,20 @@ impl Texture {
     }
 }
 
+impl Texture {
+    /// Adds the images that it is made of to a list.
+    pub(crate) fn collect_images<'a>(&'a self, images: &mut Vec<&'a ImageTexture>) {
+        match self {
+            Self::Constant(_) | Self::Function(_) => {}
+            Self::Image(image) => images.push(image),
+            Self::Scale(first, second) => [first, second].iter().for_each(|part| part.collect_images(images)),
+            Self::Mix(from, to, amount) => {
+                [from, to, amount].iter().for_each(|part| part.collect_images(images));
+            }
+        }
+    }
+}
+
 fn product(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
 }

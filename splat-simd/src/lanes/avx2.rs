@@ -6,7 +6,7 @@
 
 #![expect(unsafe_code, reason = "intrinsics; see the module's documentation")]
 
-use super::{Eight, Kernel, Lanes};
+use super::{Eight, Kernel, LANES, Lanes};
 use std::arch::is_x86_feature_detected;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -14,6 +14,20 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 /// Eight lanes.
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
+
+impl Avx2 {
+    /// Lanes from a register, for its sibling, which is only ever there where these are.
+    #[inline(always)]
+    pub(super) fn from_register(register: __m256) -> Self {
+        Self(register)
+    }
+
+    /// The register.
+    #[inline(always)]
+    pub(super) fn into_register(self) -> __m256 {
+        self.0
+    }
+}
 
 /// Whether the processor has AVX2, and the bit instructions that came with it.
 pub fn is_available() -> bool {
@@ -73,6 +87,7 @@ operator!(BitOr, bitor, _mm256_or_ps);
 impl Lanes for Avx2 {
     const CELLS: usize = 1;
     type Index = __m256i;
+    type Single = Self;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -192,5 +207,35 @@ impl Lanes for Avx2 {
     fn look_up(table: &Eight, index: __m256i) -> Self {
         // SAFETY: see the module's documentation; the permutation reads three bits of each index.
         Self(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), index) })
+    }
+
+    #[inline(always)]
+    fn load_pairs([a, b, c, d]: [&[f32; 2]; 4]) -> Self {
+        // SAFETY: see the module's documentation; each pair is as long as half of a register of 128 bits.
+        unsafe {
+            let low = _mm_loadh_pd(_mm_load_sd(a.as_ptr().cast()), b.as_ptr().cast());
+            let high = _mm_loadh_pd(_mm_load_sd(c.as_ptr().cast()), d.as_ptr().cast());
+            Self(_mm256_castpd_ps(_mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(low), high)))
+        }
+    }
+
+    #[inline(always)]
+    fn whole(self) -> [i32; LANES] {
+        let mut whole = [0; LANES];
+        // SAFETY: see the module's documentation; the array is as long as the register.
+        unsafe { _mm256_storeu_si256(whole.as_mut_ptr().cast(), _mm256_cvttps_epi32(self.0)) }
+        whole
+    }
+
+    #[inline(always)]
+    fn sums([a, b, c, d]: [Self; 4]) -> [f32; 4] {
+        let mut sums = [0.0; 4];
+        // SAFETY: see the module's documentation; the array is as long as half of the register.
+        unsafe {
+            let halves = _mm256_hadd_ps(_mm256_hadd_ps(a.0, b.0), _mm256_hadd_ps(c.0, d.0));
+            let sum = _mm_add_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves));
+            _mm_storeu_ps(sums.as_mut_ptr(), sum);
+        }
+        sums
     }
 }

@@ -4,7 +4,8 @@
 
 #![expect(unsafe_code, reason = "intrinsics; see the module's documentation")]
 
-use super::{Eight, Kernel, Lanes};
+use super::avx2::Avx2;
+use super::{Eight, Kernel, LANES, Lanes};
 use std::arch::is_x86_feature_detected;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -59,6 +60,13 @@ operator!(BitAnd, bitand, _mm512_and_ps);
 operator!(BitOr, bitor, _mm512_or_ps);
 
 impl Avx512 {
+    /// The lanes of the first cell.
+    #[inline(always)]
+    fn first_cell(self) -> Avx2 {
+        // SAFETY: see the module's documentation.
+        Avx2::from_register(unsafe { _mm512_castps512_ps256(self.0) })
+    }
+
     /// The vector whose lanes are all ones where the processor's mask is set.
     #[inline(always)]
     fn from_mask(mask: __mmask16) -> Self {
@@ -77,6 +85,7 @@ impl Avx512 {
 impl Lanes for Avx512 {
     const CELLS: usize = 2;
     type Index = __m512i;
+    type Single = Avx2;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -203,5 +212,22 @@ impl Lanes for Avx512 {
             let entries = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(half), half);
             Self(_mm512_permutexvar_ps(index, entries))
         }
+    }
+
+    #[inline(always)]
+    fn load_pairs(pairs: [&[f32; 2]; 4]) -> Self {
+        let cell = Avx2::load_pairs(pairs).into_register();
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(cell), cell) })
+    }
+
+    #[inline(always)]
+    fn whole(self) -> [i32; LANES] {
+        self.first_cell().whole()
+    }
+
+    #[inline(always)]
+    fn sums([a, b, c, d]: [Self; 4]) -> [f32; 4] {
+        Avx2::sums([a.first_cell(), b.first_cell(), c.first_cell(), d.first_cell()])
     }
 }

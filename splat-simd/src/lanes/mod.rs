@@ -35,6 +35,9 @@ pub trait Lanes:
     /// For each lane the number of an entry of a table of eight.
     type Index: Copy;
 
+    /// Lanes over one cell, of the same instruction set.
+    type Single: Lanes;
+
     /// The same value in every lane.
     fn splat(value: f32) -> Self;
 
@@ -91,6 +94,15 @@ pub trait Lanes:
 
     /// For each lane, an entry of `table`.
     fn look_up(table: &Eight, index: Self::Index) -> Self;
+
+    /// Four pairs of neighbours, one after the other, in each cell.
+    fn load_pairs(pairs: [&[f32; 2]; 4]) -> Self;
+
+    /// The lanes of the first cell without their fractions, for lanes whose magnitude is below 2^31; arbitrary for others.
+    fn whole(self) -> [i32; LANES];
+
+    /// For each of four vectors the sum of the first cell's lanes, `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))`.
+    fn sums(vectors: [Self; 4]) -> [f32; 4];
 
     /// The lanes of one cell, in every cell.
     #[inline(always)]

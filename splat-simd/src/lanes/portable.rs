@@ -6,6 +6,7 @@ use wide::f32x8;
 impl Lanes for f32x8 {
     const CELLS: usize = 1;
     type Index = [i32; LANES];
+    type Single = Self;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
@@ -106,4 +107,26 @@ impl Lanes for f32x8 {
         // The remainder keeps what a lane without a hit holds within the table.
         Self::new(index.map(|index| table[index as usize % LANES]))
     }
+
+    #[inline(always)]
+    fn load_pairs([[a, b], [c, d], [e, f], [g, h]]: [&[f32; 2]; 4]) -> Self {
+        Self::new([*a, *b, *c, *d, *e, *f, *g, *h])
+    }
+
+    #[inline(always)]
+    fn whole(self) -> [i32; LANES] {
+        self.fast_trunc_int().to_array()
+    }
+
+    #[inline(always)]
+    fn sums([a, b, c, d]: [Self; 4]) -> [f32; 4] {
+        [sum(a), sum(b), sum(c), sum(d)]
+    }
+}
+
+/// The sum of the lanes, in the order of [`Lanes::sums`].
+#[inline(always)]
+fn sum(vector: f32x8) -> f32 {
+    let [a, b, c, d, e, f, g, h] = vector.to_array();
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
 }

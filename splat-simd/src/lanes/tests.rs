@@ -124,6 +124,7 @@ impl Kernel for CheckPair {
 
         check("load", &lanes(a), |i| x[i]);
         check("load of one cell", &lanes(L::load(&a0)), |i| x[i % LANES]);
+        assert_eq!(L::Single::CELLS, 1);
         check("splat", &lanes(L::splat(x[3])), |_| x[3]);
         check("splat of cells", &lanes(L::splat_cells(x[3], y[2])), |i| if i < LANES { x[3] } else { y[2] });
 
@@ -161,6 +162,17 @@ impl Kernel for CheckPair {
         let floor = lanes(a.round_down());
         for (i, &found) in floor.iter().enumerate().filter(|(i, _)| x[*i].abs() < 2_147_483_648.0) {
             assert_eq!(found, x[i].floor(), "{} rounded down", x[i]);
+        }
+
+        let pair = |i: usize| [x[i], x[i + 1]];
+        let pairs = [pair(3), pair(0), pair(5), pair(2)];
+        let found = lanes(L::load_pairs([&pairs[0], &pairs[1], &pairs[2], &pairs[3]]));
+        check("load of pairs", &found, |i| pairs[i % LANES / 2][i % 2]);
+        let sums = L::sums([a, b, L::splat(0.25), b]);
+        let sum = |x: &[f32]| ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
+        check("sums", &sums, |i| [sum(&x), sum(&y), 2.0, sum(&y)][i]);
+        for (i, whole) in a.whole().into_iter().enumerate().filter(|(i, _)| x[*i].abs() < 2_147_483_648.0) {
+            assert_eq!(whole, x[i] as i32, "whole part of {}", x[i]);
         }
         L::CELLS
     }
