@@ -112,7 +112,8 @@ impl Renderer {
         self.level
     }
 
-    /// Renders a cloud: the same bits as [`splat_core::render()`], whatever the threads and the level. `progress` is told
+    /// Renders a cloud: the same bits as [`splat_core::render()`], whatever the threads and the level; but colours of images
+    /// that are looked up pixel by pixel are rounded otherwise (see [`crate::texture`]). `progress` is told
     /// the finished part of the picture, from 0 to 1, now and then.
     ///
     /// # Errors
