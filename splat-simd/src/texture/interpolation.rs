@@ -35,8 +35,12 @@ impl<L: Lanes> Bilinear<L> {
         let along_y = L::load(&ALONG_Y[0]) + L::load(&ALONG_Y[1]) * L::splat(ty);
         let weights = along_x * along_y * L::splat(weight);
         let (planes, column) = (level.planes::<C>(), level.in_row(level.column(x)));
-        let above = planes.texels::<2>(level.row(y) + column);
-        let below = planes.texels::<2>(level.row(y.saturating_add(1)) + column);
+        let (Some(above), Some(below)) = (
+            planes.texels::<2>(level.row(y) + column),
+            planes.texels::<2>(level.row(y.saturating_add(1)) + column),
+        ) else {
+            return;
+        };
         for pair in 0..C.div_ceil(2) {
             // The last of an odd number of channels stands twice.
             let (first, second) = (2 * pair, (2 * pair + 1).min(C - 1));
@@ -90,9 +94,15 @@ impl ProbeRow {
     /// texels.
     #[inline(always)]
     pub fn mean<L: Lanes, const C: usize>(&self, levels: &[ProbedLevel<'_>]) -> ([f32; 4], u32) {
+        let mut sums = Bilinear::<L>::new();
+        if self.count == 1 {
+            for probed in levels {
+                sums.add::<C>(probed.level, probed.place, probed.share);
+            }
+            return (sums.sums::<C>(), sums.texels);
+        }
         let count = L::splat(self.count as f32);
         let polynomial = Weight::<L>::new();
-        let mut sums = Bilinear::<L>::new();
         let mut total = L::splat(0.0);
         for first in (0..self.count).step_by(LANES) {
             let number = L::splat(first as f32) + L::load(&COUNTING);
@@ -161,9 +171,10 @@ pub fn bicubic<const C: usize>(level: &LaneLevel, place: Place) -> [f32; 4] {
     let (planes, column) = (level.planes::<C>(), level.in_row(level.column(x.saturating_sub(1))));
     let mut values = [[0.0; 4]; C];
     for row in 0..4 {
-        let texels = planes.texels::<4>(level.row(y.saturating_add(row as i32 - 1)) + column);
-        for (values, texels) in values.iter_mut().zip(texels) {
-            values[row] = catmull_rom(texels, place.rest[0]);
+        if let Some(texels) = planes.texels::<4>(level.row(y.saturating_add(row as i32 - 1)) + column) {
+            for (values, texels) in values.iter_mut().zip(texels) {
+                values[row] = catmull_rom(texels, place.rest[0]);
+            }
         }
     }
     let mut color = [0.0; 4];

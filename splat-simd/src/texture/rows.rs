@@ -8,6 +8,17 @@ use splat_core::texture::filter::WEIGHT_POLYNOMIAL;
 /// The numbers of the lanes.
 pub const COUNTING: Eight = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
+/// The numbers of the lanes of each half.
+const COUNTING_TWICE: Eight = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+
+/// For each two of eight rows the lanes' rows.
+const PAIRS_OF_ROWS: [Eight; 4] = [
+    [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0],
+    [2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0],
+    [4.0, 4.0, 4.0, 4.0, 5.0, 5.0, 5.0, 5.0],
+    [6.0, 6.0, 6.0, 6.0, 7.0, 7.0, 7.0, 7.0],
+];
+
 /// A place among the texels of a level, in whole texels and a rest in [0, 1); texel i has its centre at i.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Place {
@@ -93,17 +104,6 @@ struct Common<L> {
 }
 
 impl RowKernel {
-    /// The kernel without rows.
-    pub const NONE: Self = Self {
-        slope: 0.0,
-        width: 0.0,
-        per_width: 0.0,
-        inverse_yy: 0.0,
-        place: Place { whole: [0; 2], rest: [0.0; 2] },
-        rows: [0, -1],
-        reach: 0,
-    };
-
     /// One of eight kernels, around a place.
     #[inline(always)]
     pub fn new(kernels: &RowKernels, lane: usize, place: Place) -> Self {
@@ -125,7 +125,11 @@ impl RowKernel {
     pub fn sums<L: Lanes, const C: usize>(&self, level: &LaneLevel) -> (Sums<L, C>, u32) {
         let half = LANES as f32 / 2.0;
         // A row's ends are hard to predict, so short rows all read as many texels.
-        if self.width < half {
+        if self.width < 0.5 * half {
+            if let Some(start) = self.start::<1>(level) {
+                return self.paired(level, start);
+            }
+        } else if self.width < half {
             if let Some(start) = self.start::<1>(level) {
                 return self.narrow::<L, C, 1>(level, start);
             }
@@ -162,8 +166,50 @@ impl RowKernel {
         let margin = self.reach + (V * LANES) as i32;
         let [column, row] = self.place.whole;
         let columns = [column.saturating_sub(margin), column.saturating_add(margin)];
-        let rows = [row.saturating_add(self.rows[0]), row.saturating_add(self.rows[1])];
+        // Pairs of rows may have one too many.
+        let rows = [row.saturating_add(self.rows[0]), row.saturating_add(self.rows[1] + 1)];
         level.is_interior(columns, rows).then(|| level.offset(column, row))
+    }
+
+    /// Rows of less than four texels, no wrap within reach: each two rows are one vector, of the four texels around either's
+    /// middle.
+    #[inline(always)]
+    fn paired<L: Lanes, const C: usize>(&self, level: &LaneLevel, start: isize) -> (Sums<L, C>, u32) {
+        let polynomial = Weight::<L>::new();
+        let counting = L::load(&COUNTING_TWICE) * L::splat(self.per_width);
+        let [a, b, c, d] = &PAIRS_OF_ROWS;
+        let pairs =
+            [L::load(a).to_index(), L::load(b).to_index(), L::load(c).to_index(), L::load(d).to_index()];
+        let planes = level.planes::<C>();
+        let mut sums = Sums::new();
+        let mut row = self.rows[0];
+        let mut at = start + row as isize * level.stride();
+        while row <= self.rows[1] {
+            let Middles { middle, least } = self.middles::<L>(row);
+            let first = (middle - L::splat(1.0)).round_down();
+            let (mut from_middle, mut leasts) = ([0.0; LANES], [0.0; LANES]);
+            ((first - middle) * L::splat(self.per_width)).store_cell::<0>(&mut from_middle);
+            least.store_cell::<0>(&mut leasts);
+            let first = first.whole();
+            let rows = (self.rows[1] - row + 1).min(LANES as i32) as usize;
+            for pair in 0..rows.div_ceil(2).min(LANES / 2) {
+                let x = L::look_up(&from_middle, pairs[pair]) + counting;
+                let least = L::look_up(&leasts, pairs[pair]);
+                let above = planes.texels::<4>(at + first[2 * pair] as isize);
+                let below = planes.texels::<4>(at + level.stride() + first[2 * pair + 1] as isize);
+                let (Some(above), Some(below)) = (above, below) else { break };
+                let weight = polynomial.at(least + x * x);
+                sums.weight = sums.weight + weight;
+                for channel in 0..C {
+                    let texels = L::load_halves([above[channel], below[channel]]);
+                    sums.colors[channel] = sums.colors[channel] + weight * texels;
+                }
+                at += 2 * level.stride();
+            }
+            row += LANES as i32;
+        }
+        let rows = self.rows[1] - self.rows[0] + 1;
+        (sums, (rows.max(0) as u32).div_ceil(2))
     }
 
     /// Rows of less than `8 V` texels, no wrap within reach: each reads the `8 V` texels around its middle.
@@ -187,10 +233,11 @@ impl RowKernel {
             least.store_cell::<0>(&mut leasts);
             let first = first.whole();
             let rows = (self.rows[1] - row + 1).min(LANES as i32) as usize;
-            for ((&first, &from_middle), &least) in first.iter().zip(&from_middle).zip(&leasts).take(rows) {
-                let (mut x, least) = (L::splat(from_middle) + common.counting, L::splat(least));
+            for i in 0..rows.min(LANES) {
+                let (mut x, least) = (L::splat(from_middle[i]) + common.counting, L::splat(leasts[i]));
                 for vector in 0..V {
-                    let texels = planes.texels::<LANES>(at + first as isize + (vector * LANES) as isize);
+                    let from = at + first[i] as isize + (vector * LANES) as isize;
+                    let Some(texels) = planes.texels::<LANES>(from) else { break };
                     sums.add(common.polynomial.at(least + x * x), texels);
                     x = x + common.step;
                 }
@@ -220,7 +267,7 @@ impl RowKernel {
                 let (mut x, least) =
                     (L::splat(spans.from_middle[i]) + common.counting, L::splat(spans.least[i]));
                 for _ in 0..spans.vectors[i] {
-                    let texels = planes.texels::<LANES>(start + level.in_row(column));
+                    let Some(texels) = planes.texels::<LANES>(start + level.in_row(column)) else { break };
                     sums.add(common.polynomial.at(least + x * x), texels);
                     x = x + common.step;
                     column = level.advance(column);

@@ -35,11 +35,6 @@ pub struct Lookups {
 /// If its file cannot be read.
 pub fn all() -> anyhow::Result<Vec<Subject>> {
     let mut images = Vec::new();
-    if let Ok(n) = std::env::var("TEX_N") {
-        let n: u32 = n.parse().unwrap();
-        let c: usize = std::env::var("TEX_C").map_or(3, |c| c.parse().unwrap());
-        images.push(Subject::new("noise", Image::noise([n, n], c, 1)));
-    }
     if let Some(photograph) = photograph()? {
         images.push(Subject::new("photograph", photograph));
     }
