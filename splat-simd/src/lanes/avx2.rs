@@ -220,6 +220,15 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn load_halves([a, b]: [&[f32; 4]; 2]) -> Self {
+        // SAFETY: see the module's documentation; each array is as long as half of the register.
+        unsafe {
+            let low = _mm256_castps128_ps256(_mm_loadu_ps(a.as_ptr()));
+            Self(_mm256_insertf128_ps::<1>(low, _mm_loadu_ps(b.as_ptr())))
+        }
+    }
+
+    #[inline(always)]
     fn whole(self) -> [i32; LANES] {
         let mut whole = [0; LANES];
         // SAFETY: see the module's documentation; the array is as long as the register.

@@ -60,6 +60,14 @@ operator!(BitAnd, bitand, _mm512_and_ps);
 operator!(BitOr, bitor, _mm512_or_ps);
 
 impl Avx512 {
+    /// A cell, in both.
+    #[inline(always)]
+    fn twice(cell: Avx2) -> Self {
+        let cell = cell.into_register();
+        // SAFETY: see the module's documentation.
+        Self(unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(cell), cell) })
+    }
+
     /// The lanes of the first cell.
     #[inline(always)]
     fn first_cell(self) -> Avx2 {
@@ -216,9 +224,12 @@ impl Lanes for Avx512 {
 
     #[inline(always)]
     fn load_pairs(pairs: [&[f32; 2]; 4]) -> Self {
-        let cell = Avx2::load_pairs(pairs).into_register();
-        // SAFETY: see the module's documentation.
-        Self(unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(cell), cell) })
+        Self::twice(Avx2::load_pairs(pairs))
+    }
+
+    #[inline(always)]
+    fn load_halves(halves: [&[f32; 4]; 2]) -> Self {
+        Self::twice(Avx2::load_halves(halves))
     }
 
     #[inline(always)]

@@ -98,6 +98,9 @@ pub trait Lanes:
     /// Four pairs of neighbours, one after the other, in each cell.
     fn load_pairs(pairs: [&[f32; 2]; 4]) -> Self;
 
+    /// Four values and another four, in each cell.
+    fn load_halves(halves: [&[f32; 4]; 2]) -> Self;
+
     /// The lanes of the first cell without their fractions, for lanes whose magnitude is below 2^31; arbitrary for others.
     fn whole(self) -> [i32; LANES];
 

@@ -114,6 +114,11 @@ impl Lanes for f32x8 {
     }
 
     #[inline(always)]
+    fn load_halves([[a, b, c, d], [e, f, g, h]]: [&[f32; 4]; 2]) -> Self {
+        Self::new([*a, *b, *c, *d, *e, *f, *g, *h])
+    }
+
+    #[inline(always)]
     fn whole(self) -> [i32; LANES] {
         self.fast_trunc_int().to_array()
     }

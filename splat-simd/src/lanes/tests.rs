@@ -168,6 +168,9 @@ impl Kernel for CheckPair {
         let pairs = [pair(3), pair(0), pair(5), pair(2)];
         let found = lanes(L::load_pairs([&pairs[0], &pairs[1], &pairs[2], &pairs[3]]));
         check("load of pairs", &found, |i| pairs[i % LANES / 2][i % 2]);
+        let halves = [[x[1], x[2], x[3], x[4]], [y[3], y[2], y[1], y[0]]];
+        let found = lanes(L::load_halves([&halves[0], &halves[1]]));
+        check("load of halves", &found, |i| halves[i % LANES / 4][i % 4]);
         let sums = L::sums([a, b, L::splat(0.25), b]);
         let sum = |x: &[f32]| ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
         check("sums", &sums, |i| [sum(&x), sum(&y), 2.0, sum(&y)][i]);

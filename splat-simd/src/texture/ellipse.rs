@@ -123,8 +123,8 @@ pub struct RowKernels {
     pub per_width: Eight,
     /// Factor on the squared distance of the row.
     pub inverse_yy: Eight,
-    /// How many rows the ellipse extends from its centre.
-    pub extent: Eight,
+    /// How many columns and rows the ellipse extends from its centre.
+    pub extent: [Eight; 2],
 }
 
 impl RowKernels {
@@ -159,13 +159,14 @@ impl RowKernels {
             width: [0.0; LANES],
             per_width: [0.0; LANES],
             inverse_yy: [0.0; LANES],
-            extent: [0.0; LANES],
+            extent: [[0.0; LANES]; 2],
         };
         (xy * inverse_yy).store_cell::<0>(&mut kernels.slope);
         width.store_cell::<0>(&mut kernels.width);
         (one / width).store_cell::<0>(&mut kernels.per_width);
         inverse_yy.store_cell::<0>(&mut kernels.inverse_yy);
-        yy.square_root().store_cell::<0>(&mut kernels.extent);
+        xx.square_root().least(reach_x).store_cell::<0>(&mut kernels.extent[0]);
+        yy.square_root().store_cell::<0>(&mut kernels.extent[1]);
         kernels
     }
 }

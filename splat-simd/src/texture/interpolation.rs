@@ -34,17 +34,17 @@ impl<L: Lanes> Bilinear<L> {
         let along_x = L::load(&ALONG_X[0]) + L::load(&ALONG_X[1]) * L::splat(tx);
         let along_y = L::load(&ALONG_Y[0]) + L::load(&ALONG_Y[1]) * L::splat(ty);
         let weights = along_x * along_y * L::splat(weight);
-        let (above, below) = (level.row::<C>(y), level.row::<C>(y.saturating_add(1)));
-        let start = above.start(x);
+        let (planes, column) = (level.planes::<C>(), level.in_row(level.column(x)));
+        let (Some(above), Some(below)) = (
+            planes.texels::<2>(level.row(y) + column),
+            planes.texels::<2>(level.row(y.saturating_add(1)) + column),
+        ) else {
+            return;
+        };
         for pair in 0..C.div_ceil(2) {
             // The last of an odd number of channels stands twice.
             let (first, second) = (2 * pair, (2 * pair + 1).min(C - 1));
-            let texels = L::load_pairs([
-                above.texels(start, first),
-                below.texels(start, first),
-                above.texels(start, second),
-                below.texels(start, second),
-            ]);
+            let texels = L::load_pairs([above[first], below[first], above[second], below[second]]);
             self.pairs[pair] = self.pairs[pair] + weights * texels;
         }
         self.texels += 4;
@@ -94,9 +94,15 @@ impl ProbeRow {
     /// texels.
     #[inline(always)]
     pub fn mean<L: Lanes, const C: usize>(&self, levels: &[ProbedLevel<'_>]) -> ([f32; 4], u32) {
+        let mut sums = Bilinear::<L>::new();
+        if self.count == 1 {
+            for probed in levels {
+                sums.add::<C>(probed.level, probed.place, probed.share);
+            }
+            return (sums.sums::<C>(), sums.texels);
+        }
         let count = L::splat(self.count as f32);
         let polynomial = Weight::<L>::new();
-        let mut sums = Bilinear::<L>::new();
         let mut total = L::splat(0.0);
         for first in (0..self.count).step_by(LANES) {
             let number = L::splat(first as f32) + L::load(&COUNTING);
@@ -162,12 +168,13 @@ impl ProbedLevel<'_> {
 #[inline(always)]
 pub fn bicubic<const C: usize>(level: &LaneLevel, place: Place) -> [f32; 4] {
     let [x, y] = place.whole;
+    let (planes, column) = (level.planes::<C>(), level.in_row(level.column(x.saturating_sub(1))));
     let mut values = [[0.0; 4]; C];
     for row in 0..4 {
-        let texels = level.row::<C>(y.saturating_add(row as i32 - 1));
-        let start = texels.start(x.saturating_sub(1));
-        for (channel, values) in values.iter_mut().enumerate() {
-            values[row] = catmull_rom(texels.texels(start, channel), place.rest[0]);
+        if let Some(texels) = planes.texels::<4>(level.row(y.saturating_add(row as i32 - 1)) + column) {
+            for (values, texels) in values.iter_mut().zip(texels) {
+                values[row] = catmull_rom(texels, place.rest[0]);
+            }
         }
     }
     let mut color = [0.0; 4];

@@ -151,7 +151,7 @@ struct Between {
 }
 
 /// A mean colour, in the pyramid's unit, and the texels read.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Mean {
     color: [f32; 4],
     texels: u32,
@@ -233,28 +233,36 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
     /// The averages of the first lookups, one for each entry of `found`.
     #[inline(always)]
     fn averages(&self, found: &mut [Average]) {
-        for (lane, found) in found.iter_mut().enumerate().take(LANES) {
-            let Mean { color, texels } = self.mean(lane);
+        let mut means = [Mean::default(); LANES];
+        let means = &mut means[..found.len().min(LANES)];
+        match self.sampler.filter {
+            Filter::EwaVc(_) | Filter::Ewa | Filter::EwaPrinted => self.sum(means),
+            Filter::Trilinear => {
+                for (lane, mean) in means.iter_mut().enumerate() {
+                    *mean = self.probed(lane, ProbeRow::ONE);
+                }
+            }
+            Filter::Assembly(probes) => {
+                for (lane, mean) in means.iter_mut().enumerate() {
+                    *mean = self.probed(lane, self.row(lane, probes));
+                }
+            }
+        }
+        let [only_magnifying, only_filtering] = MAGNIFYING;
+        for (lane, (mean, found)) in means.iter().zip(found).enumerate() {
+            let share = (self.axes[0][lane] - only_magnifying) / (only_filtering - only_magnifying);
+            let Mean { color, texels } = if share >= 1.0 {
+                *mean
+            } else if share > 0.0 {
+                self.magnified(lane).mix(*mean, share)
+            } else {
+                self.magnified(lane)
+            };
             *found = Average { color, texels };
             for value in &mut found.color {
                 *value = (*value * self.pyramid.unit).clamp(f32::MIN, f32::MAX);
             }
         }
-    }
-
-    #[inline(always)]
-    fn mean(&self, lane: usize) -> Mean {
-        let [only_magnifying, only_filtering] = MAGNIFYING;
-        let share = (self.axes[0][lane] - only_magnifying) / (only_filtering - only_magnifying);
-        if share <= 0.0 {
-            return self.magnified(lane);
-        }
-        let filtered = match self.sampler.filter {
-            Filter::EwaVc(_) | Filter::Ewa | Filter::EwaPrinted => self.summed(lane),
-            Filter::Trilinear => self.probed(lane, ProbeRow::ONE),
-            Filter::Assembly(probes) => self.probed(lane, self.row(lane, probes)),
-        };
-        if share >= 1.0 { filtered } else { self.magnified(lane).mix(filtered, share) }
     }
 
     #[inline(always)]
@@ -275,26 +283,46 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
         Mean { color: sum.sums::<C>(), texels: sum.texels }
     }
 
-    /// EWA: row by row at one level, or at two.
+    /// EWA of the first lookups: row by row at one level, or at two. In steps of eight lookups each, so that one need not
+    /// wait for another.
     #[inline(always)]
-    fn summed(&self, lane: usize) -> Mean {
-        let Between { finer, share } = self.levels[lane];
-        let mut mean = self.summed_at(0, finer, lane);
-        if share > 0.0 {
-            mean = mean.mix(self.summed_at(1, finer + 1, lane), share);
+    fn sum(&self, means: &mut [Mean]) {
+        self.sum_at(0, means);
+        if matches!(self.sampler.filter, Filter::EwaVc(_)) {
+            return;
         }
-        mean
+        let mut coarser = [Mean::default(); LANES];
+        let coarser = &mut coarser[..means.len().min(LANES)];
+        self.sum_at(1, coarser);
+        for (lane, (mean, coarser)) in means.iter_mut().zip(coarser).enumerate() {
+            if self.levels[lane].share > 0.0 {
+                *mean = mean.mix(*coarser, self.levels[lane].share);
+            }
+        }
     }
 
+    /// The same at the finer or the next level.
     #[inline(always)]
-    fn summed_at(&self, kernel: usize, level: usize, lane: usize) -> Mean {
-        let kernel = RowKernel::new(&self.kernels[kernel], lane, self.place(level, lane));
-        let sums = kernel.sums::<L, C>(&self.pyramid.levels[level]);
-        // An ellipse always has a texel (it is at least a texel wide); should it not, the nearest do.
-        sums.mean().unwrap_or_else(
-            #[inline(always)]
-            || self.bilinear(level, lane),
-        )
+    fn sum_at(&self, next: usize, means: &mut [Mean]) {
+        let mut kernels = [RowKernel::default(); LANES];
+        let mut levels = [&self.pyramid.levels[0]; LANES];
+        for (lane, kernel) in kernels.iter_mut().enumerate().take(means.len()) {
+            let index = (self.levels[lane].finer + next).min(self.pyramid.levels.len() - 1);
+            levels[lane] = &self.pyramid.levels[index];
+            *kernel = RowKernel::new(&self.kernels[next], lane, self.place(index, lane));
+        }
+        let mut sums = [Sums::<L, C>::new(); LANES];
+        for (lane, mean) in means.iter_mut().enumerate().take(LANES) {
+            let needed = next == 0 || self.levels[lane].share > 0.0;
+            if needed && self.axes[0][lane] > MAGNIFYING[0] {
+                let vectors;
+                (sums[lane], vectors) = kernels[lane].sums(levels[lane]);
+                mean.texels = LANES as u32 * vectors;
+            }
+        }
+        for (mean, sums) in means.iter_mut().zip(&sums) {
+            mean.color = sums.mean();
+        }
     }
 
     /// A row of probes at one level, or at two.
@@ -362,18 +390,18 @@ impl Mean {
 }
 
 impl<L: Lanes, const C: usize> Sums<L, C> {
-    /// The mean, if any texel has a weight.
+    /// The mean; 0 where no texel has a weight, which no ellipse has: all are at least a texel wide.
     #[inline(always)]
-    fn mean(&self) -> Option<Mean> {
+    fn mean(&self) -> [f32; 4] {
         let last = self.colors[C - 1];
         let at = |channel: usize| if channel < C { channel } else { C - 1 };
         let mut color = L::sums([self.colors[0], self.colors[at(1)], self.colors[at(2)], self.weight]);
-        let weight = color[3];
+        let weight = if color[3] > 0.0 { color[3] } else { 1.0 };
         color[3] = if C == 4 { L::sums([last; 4])[0] } else { 0.0 };
         for (channel, value) in color.iter_mut().enumerate() {
             *value = if channel < C { *value / weight } else { 0.0 };
         }
-        (weight > 0.0).then_some(Mean { color, texels: LANES as u32 * self.vectors })
+        color
     }
 }
 

@@ -6,13 +6,16 @@ use crate::lanes::LANES;
 use splat_core::texture::filter::{BILINEAR_VARIANCE, KERNEL_VARIANCE, MAX_PERIODS};
 use splat_core::texture::pyramid::{Level, Pyramid, Wrap};
 
+/// Values between two channels of a level, lest the same texel's meet in one set of the cache.
+const APART: usize = 48;
+
 /// The largest position, in periods, of wraps that are no period.
 const FAR: f64 = 64.0;
 
 /// A [`Pyramid`] in linear `f32`, prepared once for lookups by lanes.
 ///
-/// Each row of a level holds its channels one after the other, each with a border that repeats, clamps, mirrors or is black
-/// as the texture's wrap says. So any eight texels of a row stand together, and no lookup has a branch for wraps within a
+/// The channels of a level stand one after the other, each row with a border that repeats, clamps, mirrors or is black as the
+/// texture's wrap says. So any eight texels of a row stand together, and no lookup has a branch for wraps within a
 /// row; rows are wrapped one at a time. (Channels by themselves, since eight weights then meet eight texels: interleaved
 /// ones need each weight four times.)
 ///
@@ -36,6 +39,10 @@ pub(super) struct LaneLevel {
     pub metric: Metric,
     columns: Columns,
     rows: Rows,
+    /// Values of one channel.
+    plane: usize,
+    /// From one channel to the next.
+    distance: usize,
     texels: Vec<f32>,
 }
 
@@ -68,6 +75,8 @@ struct Columns {
     range: [i32; 2],
     /// Texels of the border at the left.
     border: i32,
+    /// The first and the last column that stands as it is numbered.
+    interior: [i32; 2],
 }
 
 /// How rows are found.
@@ -78,7 +87,7 @@ struct Rows {
 }
 
 /// Where eight texels of a row start, before the border; moved along the row in steps of [`LANES`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Column(i32);
 
 impl Columns {
@@ -87,7 +96,14 @@ impl Columns {
         let count = count as i32;
         let periodic = |period: i32| {
             let period = period * ((eight + period - 1) / period);
-            Self { stride: (period + eight) as usize, period, range: [0, i32::MAX], border: 0 }
+            let stride = period + eight;
+            Self {
+                stride: stride as usize,
+                period,
+                range: [0, i32::MAX],
+                border: 0,
+                interior: [0, stride - 1],
+            }
         };
         match wrap {
             Wrap::Repeat => periodic(count),
@@ -97,6 +113,7 @@ impl Columns {
                 period: i32::MAX,
                 range: [-eight, count],
                 border: eight,
+                interior: [-eight, count + eight - 1],
             },
         }
     }
@@ -117,8 +134,8 @@ impl Columns {
 
     /// The place in the row.
     #[inline(always)]
-    fn offset(&self, column: Column) -> usize {
-        (column.0.clamp(self.range[0], self.range[1]) + self.border) as usize
+    fn offset(&self, column: Column) -> isize {
+        column.0.clamp(self.range[0], self.range[1]) as isize + self.border as isize
     }
 }
 
@@ -142,17 +159,20 @@ impl Rows {
     }
 }
 
-/// A row of a level, ready to be read.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Row<'a> {
-    texels: &'a [f32],
-    columns: &'a Columns,
-}
+/// The channels of a level.
+#[derive(Clone, Copy)]
+pub(super) struct Planes<'a, const C: usize>([&'a [f32]; C]);
 
-impl<'a> Row<'a> {
-    /// The place of texel `x`, any at all.
+impl LaneLevel {
+    /// Where the row at `y` starts in each channel; any y at all.
     #[inline(always)]
-    pub fn start(&self, x: i32) -> Column {
+    pub fn row(&self, y: i32) -> isize {
+        self.rows.at(y) as isize * self.columns.stride as isize
+    }
+
+    /// The place of texel `x` of any row, any at all.
+    #[inline(always)]
+    pub fn column(&self, x: i32) -> Column {
         self.columns.start(x)
     }
 
@@ -162,22 +182,56 @@ impl<'a> Row<'a> {
         self.columns.advance(column)
     }
 
-    /// `N` texels (8 at most) of a channel from a place on.
+    /// The place in the row.
     #[inline(always)]
-    pub fn texels<const N: usize>(&self, column: Column, channel: usize) -> &'a [f32; N] {
-        let start = self.columns.offset(column) + channel * self.columns.stride;
-        // There always are as many: a panic would be slower than this.
-        self.texels.get(start..).and_then(|texels| texels.first_chunk()).unwrap_or(&[0.0; N])
+    pub fn in_row(&self, column: Column) -> isize {
+        self.columns.offset(column)
+    }
+
+    /// From one row to the next.
+    #[inline(always)]
+    pub fn stride(&self) -> isize {
+        self.columns.stride as isize
+    }
+
+    /// Whether texels of these ranges stand as they are numbered, borders included.
+    #[inline(always)]
+    pub fn is_interior(&self, columns: [i32; 2], rows: [i32; 2]) -> bool {
+        columns[0] >= self.columns.interior[0]
+            && columns[1] <= self.columns.interior[1]
+            && rows[0] >= 0
+            && rows[1] < self.rows.count
+    }
+
+    /// Where a texel stands, if it stands as it is numbered.
+    #[inline(always)]
+    pub fn offset(&self, x: i32, y: i32) -> isize {
+        y as isize * self.stride() + x as isize + self.columns.border as isize
+    }
+
+    /// The texels.
+    #[inline(always)]
+    pub fn planes<const C: usize>(&self) -> Planes<'_, C> {
+        let length = self.plane;
+        let mut planes: [&[f32]; C] = [&[]; C];
+        for (channel, plane) in planes.iter_mut().enumerate() {
+            // All of the same length, so that one test of an index serves all.
+            *plane = &self.texels[channel * self.distance..][..length];
+        }
+        Planes(planes)
     }
 }
 
-impl LaneLevel {
-    /// The row at `y`, any at all.
+impl<'a, const C: usize> Planes<'a, C> {
+    /// `N` texels of each channel. None only where there are not as many, which never is.
     #[inline(always)]
-    pub fn row<const C: usize>(&self, y: i32) -> Row<'_> {
-        let length = C * self.columns.stride;
-        let start = self.rows.at(y) * length;
-        Row { texels: self.texels.get(start..start + length).unwrap_or(&[]), columns: &self.columns }
+    pub fn texels<const N: usize>(&self, offset: isize) -> Option<[&'a [f32; N]; C]> {
+        let start = offset as usize;
+        let mut texels = [&[0.0; N]; C];
+        for (texels, plane) in texels.iter_mut().zip(self.0) {
+            *texels = plane.get(start..)?.first_chunk()?;
+        }
+        Some(texels)
     }
 }
 
@@ -232,7 +286,7 @@ impl LanePyramid {
     pub(super) fn of_width(&self, width: f32) -> Between {
         let finer = self.coarsest_within(width);
         let Metric { coarseness, per_step, .. } = self.levels[finer].metric;
-        let share = if width > coarseness { libm::log2f(width / coarseness) * per_step[0] } else { 0.0 };
+        let share = logarithm((width / coarseness).clamp(1.0, 2.0)) * per_step[0];
         Between { finer, share: share.clamp(0.0, 1.0) }
     }
 
@@ -274,6 +328,16 @@ fn reduced(position: f32, wrap: Wrap) -> f64 {
     }
 }
 
+/// The logarithm to the base 2 of a ratio in [1, 2], by the series of `2 artanh(z)`, z = (x - 1) / (x + 1) <= 1/3: what is
+/// left out is below 2 z^13 / 13 / ln 2 = 1.4e-7.
+#[inline(always)]
+fn logarithm(x: f32) -> f32 {
+    let z = (x - 1.0) / (x + 1.0);
+    let z2 = z * z;
+    let series = ((((z2 / 11.0 + 1.0 / 9.0) * z2 + 1.0 / 7.0) * z2 + 0.2) * z2 + 1.0 / 3.0) * z2 + 1.0;
+    2.0 * std::f32::consts::LOG2_E * z * series
+}
+
 /// The power of two over which texels are stored: 1 unless they are so large that a sum of weighted ones may overflow.
 fn unit(pyramid: &Pyramid) -> f32 {
     let finest = &pyramid.levels()[0];
@@ -290,18 +354,20 @@ fn level(pyramid: &Pyramid, index: usize, unit: f32) -> LaneLevel {
     let rows = Rows { wrap: pyramid.wrap()[1], count: height as i32 };
     let black = i64::from(rows.wrap == Wrap::Black);
     let channels = pyramid.channels();
-    let mut texels = vec![0.0; (i64::from(height) + black) as usize * channels * columns.stride];
-    let rows_of_texels = texels.chunks_exact_mut(channels * columns.stride);
-    for (y, row) in rows_of_texels.enumerate() {
+    let plane = (i64::from(height) + black) as usize * columns.stride;
+    let distance = plane + APART;
+    let mut texels = vec![0.0; distance * channels];
+    for y in 0..plane / columns.stride {
         for column in 0..columns.stride {
             // The black row, too, stands where the pyramid is black.
             let texel = pyramid.texel(index, column as i64 - i64::from(columns.border), y as i64);
-            for channel in 0..channels {
-                row[channel * columns.stride + column] = texel[channel] / unit;
+            for (channel, value) in texel.into_iter().enumerate().take(channels) {
+                texels[channel * distance + y * columns.stride + column] = value / unit;
             }
         }
     }
-    LaneLevel { size: [f64::from(width), f64::from(height)], metric: metric(source), columns, rows, texels }
+    let size = [f64::from(width), f64::from(height)];
+    LaneLevel { size, metric: metric(source), columns, rows, plane, distance, texels }
 }
 
 fn metric(level: &Level) -> Metric {

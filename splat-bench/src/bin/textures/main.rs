@@ -7,13 +7,15 @@
 mod images;
 mod markdown;
 mod measure;
+mod plot;
 
 use anyhow::bail;
-use measure::{ANISOTROPIES, Column, Effort, SETS};
+use measure::{ANISOTROPIES, Effort, SETS};
 
 const USAGE: &str = "\
 textures             the tables of docs/textures.md
 textures --quick     the same of fewer lookups and repetitions
+textures --plot FILE the tables, and a plot of those of the first image as SVG
 textures --run FILTER ANISOTROPY COUNT
                      looks the first image up COUNT times, at the level of SPLAT_LEVEL: ns a lookup, for profilers";
 
@@ -23,9 +25,10 @@ const QUICK: Effort = Effort { tiles: [16, 2], truths: 64, repetitions: 3 };
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let effort = match arguments[..] {
-        [] => FULL,
-        ["--quick"] => QUICK,
+    let (effort, file) = match arguments[..] {
+        [] => (FULL, None),
+        ["--quick"] => (QUICK, None),
+        ["--plot", file] => (FULL, Some(file)),
         ["--run", filter, anisotropy, count] => {
             let time = measure::run(&images::all()?[0], filter, anisotropy.parse()?, count.parse()?)?;
             println!("{time:.1}");
@@ -41,15 +44,14 @@ fn main() -> anyhow::Result<()> {
     if subjects.iter().all(|subject| subject.name != "photograph") {
         eprintln!("{}", images::skipped());
     }
-    for subject in &subjects {
-        for set in 0..SETS.len() {
-            let columns: Vec<Column> = ANISOTROPIES
-                .map(|anisotropy| measure::column(subject, set, anisotropy, effort))
-                .into_iter()
-                .collect();
-            let columns: Vec<&Column> = columns.iter().collect();
-            println!("\n### {}, {}\n", subject.name, SETS[set].0);
-            println!("{}\n\n{}", markdown::times(&columns), markdown::errors(&columns));
+    for (i, subject) in subjects.iter().enumerate() {
+        for (j, (set, _)) in SETS.into_iter().enumerate() {
+            let columns = ANISOTROPIES.map(|anisotropy| measure::column(subject, j, anisotropy, effort));
+            println!("### {}, {set}\n", subject.name);
+            println!("{}\n\n{}\n", markdown::times(&columns), markdown::errors(&columns));
+            if let Some(file) = file.filter(|_| i == 0 && j == 0) {
+                plot::write(file.as_ref(), subject.name, &columns)?;
+            }
         }
     }
     Ok(())

@@ -3,7 +3,7 @@
 use crate::measure::{Column, FILTERS, Measured, Method};
 
 /// Times of one image and set: a row a method, a column an anisotropy.
-pub fn times(columns: &[&Column]) -> String {
+pub fn times(columns: &[Column]) -> String {
     let mut text = String::from("| filter | core |");
     for column in columns {
         text += &format!(" {}:1, ns | ratio | texels |", column.anisotropy);
@@ -20,7 +20,7 @@ pub fn times(columns: &[&Column]) -> String {
 }
 
 /// Errors of one image and set. Lanes have the same bits at every level, so one row stands for all.
-pub fn errors(columns: &[&Column]) -> String {
+pub fn errors(columns: &[Column]) -> String {
     let mut text = String::from("| filter | core |");
     for column in columns {
         text += &format!(" {}:1, RMSE | max | of printed |", column.anisotropy);

@@ -59,8 +59,6 @@ pub struct Measured {
 
 /// Everything of one image, set and anisotropy.
 pub struct Column {
-    pub subject: &'static str,
-    pub set: &'static str,
     pub anisotropy: f64,
     pub methods: Vec<Measured>,
     /// The root mean squared error of the printed EWA at its best width.
@@ -135,7 +133,7 @@ pub fn run(subject: &Subject, name: &str, anisotropy: f64, count: usize) -> anyh
 
 /// Measures all methods.
 pub fn column(subject: &Subject, set: usize, anisotropy: f64, effort: Effort) -> Column {
-    let (set, minor) = SETS[set];
+    let (_, minor) = SETS[set];
     let fewer = usize::from(anisotropy >= FEWER_FROM);
     let lookups = Lookups::new(subject.image.size, minor, anisotropy, effort.tiles[0]);
     let mut found = vec![Average::default(); lookups.requests.len()];
@@ -168,7 +166,7 @@ pub fn column(subject: &Subject, set: usize, anisotropy: f64, effort: Effort) ->
         Measured { method, time, texels, errors }
     });
     let methods = measured.collect();
-    Column { subject: subject.name, set, anisotropy, methods, best_printed }
+    Column { anisotropy, methods, best_printed }
 }
 
 impl Lookups {
