@@ -14,7 +14,7 @@ use splat_core::texture::{
 };
 use splat_io::read_pyramid;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Checks what can be checked before anything is read.
@@ -46,27 +46,45 @@ pub fn check(arguments: &MaterialArguments) -> Result<(), UsageError> {
     }
 }
 
-/// Reads the images and lays them on a prepared cloud whose up axis is `up`.
+/// The images of a material.
+#[derive(Debug)]
+pub struct Images {
+    texture: Option<Arc<Pyramid>>,
+    environment: Option<Arc<Pyramid>>,
+}
+
+/// Reads the images; before the clouds, which take longer.
 ///
 /// # Errors
-/// Images that cannot be read; a mapping that the cloud has no coordinates for.
+/// Images that cannot be read.
+pub fn read(arguments: &MaterialArguments, console: Console) -> anyhow::Result<Images> {
+    let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
+    let read =
+        |path: &Option<PathBuf>, wrap| path.as_ref().map(|path| image(path, wrap, console)).transpose();
+    Ok(Images {
+        texture: read(&arguments.texture, [wrap; 2])?,
+        environment: read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?,
+    })
+}
+
+/// Lays the images on a prepared cloud whose up axis is `up`.
+///
+/// # Errors
+/// A mapping that the cloud has no coordinates for.
 pub fn material(
     arguments: &MaterialArguments,
+    images: Images,
     cloud: &Cloud,
     up: Up,
-    console: Console,
-) -> anyhow::Result<Material> {
+) -> Result<Material, UsageError> {
     let mut material = Material { detail: arguments.texture_detail.into(), ..Material::default() };
-    if let Some(path) = &arguments.texture {
-        let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
+    if let Some(pyramid) = images.texture {
         let mapping = mapping(arguments, cloud, up)?;
-        let pyramid = image(path, [wrap; 2], console)?;
         let image = ImageTexture { pyramid, sampler: sampler(arguments), mapping };
         material.texture = Some(Arc::new(Texture::Image(image)));
     }
-    if let Some(path) = &arguments.environment {
+    if let Some(image) = images.environment {
         let [up, front, _] = up.axes();
-        let image = image(path, [Wrap::Repeat, Wrap::Clamp], console)?;
         // The middle of the image is what someone sees who looks at the front.
         let optics = arguments.refract.map_or(Optics::Reflect, Optics::Refract);
         let environment = Environment::new(image, sampler(arguments), axes(front, up), optics);

@@ -32,6 +32,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
+    let images = material::read(&arguments.material, console)?;
     let reading = Reading { sampling: Sampling::default(), with_faces: false };
     let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
     times.read = time;
@@ -52,7 +53,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     inputs::check_usable(&cloud, &reports)?;
     let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
     let up = resolve::up(&arguments.camera, &cloud);
-    options.material = material::material(&arguments.material, &cloud, up, console)?;
+    options.material = material::material(&arguments.material, images, &cloud, up)?;
     options.check()?;
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;

@@ -233,6 +233,78 @@ fn a_mesh_is_converted_and_both_render_alike() {
     assert_eq!(pixels[(height / 2 * width + width / 2) as usize][3], 255);
 }
 
+/// Writes a PNG of four fields: red and green above, blue and white below.
+fn write_texture(path: &Path) {
+    const SIDE: usize = 64;
+    let mut encoder = png::Encoder::new(fs::File::create(path).unwrap(), SIDE as u32, SIDE as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().unwrap();
+    let texel = |i: usize| match (i % SIDE < SIDE / 2, i / SIDE < SIDE / 2) {
+        (true, true) => [255, 0, 0],
+        (false, true) => [0, 255, 0],
+        (true, false) => [0, 0, 255],
+        (false, false) => [255; 3],
+    };
+    let texels: Vec<u8> = (0..SIDE * SIDE).flat_map(texel).collect();
+    writer.write_image_data(&texels).unwrap();
+}
+
+#[test]
+fn a_mesh_shows_its_texture_upright_with_every_mapping_and_surroundings() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("square.obj"), SQUARE).unwrap();
+    write_texture(&folder.path().join("texture.png"));
+    let corners = |options: &str| {
+        let line = format!("render square.obj -o out.png --view front --size 64x64 --spp 4 {options}");
+        succeeds(folder.path(), &line);
+        let (width, _, pixels) = read_png(&folder.path().join("out.png"));
+        [(20, 20), (44, 20), (20, 44), (44, 44)].map(|(x, y)| {
+            let [red, green, blue, _] = pixels[y * width as usize + x];
+            [red > 128, green > 128, blue > 128]
+        })
+    };
+    let [red, green, blue, white] =
+        [[true, false, false], [false, true, false], [false, false, true], [true; 3]];
+    for options in
+        ["", "--texture-detail splat", "--texture-filter trilinear", "--engine reference", "--engine both"]
+    {
+        let found = corners(&format!("--texture texture.png --texture-wrap clamp {options}"));
+        assert_eq!(found, [red, green, blue, white], "{options}");
+    }
+    let planar = corners("--texture texture.png --mapping planar");
+    assert_eq!(planar, [red, green, blue, white]);
+    // A flat sheet before the whole sky: seen through, its middle is in the middle, and left is left.
+    let through = corners("--environment texture.png --refract 1.000001");
+    assert_eq!(through, [red, green, blue, white]);
+    // In the mirror is what stands behind the viewer: the image's edges, each on its own side.
+    let mirror = corners("--environment texture.png --reflect");
+    assert_eq!(mirror, [red, green, blue, white]);
+}
+
+#[test]
+fn materials_that_make_no_sense_say_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let cloud = sphere(DVec3::ZERO);
+    write_ply(&folder.path().join("in.ply"), &cloud, PlyEncoding::Binary).unwrap();
+    write_texture(&folder.path().join("t.png"));
+    fs::write(folder.path().join("t.jpg"), [0xff, 0xd8, 0xff, 0xe0, 0, 16]).unwrap();
+    let cases = [
+        ("--mapping planar", 2, "--mapping says nothing without --texture"),
+        ("--texture t.png", 2, "add --mapping spherical, cylindrical or planar"),
+        ("--texture t.png --mapping planar --texture-repeat 2,2", 2, "--texture-repeat needs --mapping uv"),
+        ("--reflect", 2, "need --environment"),
+        ("--light 0,0", 2, "--light says nothing without --shading lambert"),
+        ("--texture t.jpg --mapping planar", 1, "a JPEG image is not supported"),
+        ("--texture none.png --mapping planar", 1, "none.png: cannot open"),
+        ("--environment t.png --max-anisotropy 0", 2, "1 to 256"),
+    ];
+    for (options, code, expected) in cases {
+        let message = fails(folder.path(), &format!("render in.ply -o out.png {options}"), code);
+        assert!(message.contains(expected), "{options}: {message}");
+    }
+    assert!(!folder.path().join("out.png").exists());
+}
+
 #[test]
 fn faces_of_a_ply_file_count_for_convert_alone() {
     let folder = tempfile::tempdir().unwrap();
