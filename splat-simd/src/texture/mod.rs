@@ -100,8 +100,8 @@ impl LaneSampler {
     pub(crate) fn eight<L: Lanes>(&self, pyramid: &LanePyramid, lookups: &Lookups, found: &mut [Average]) {
         match pyramid.channels {
             1 => Eightfold::<L::Single, 1>::new(self, pyramid, lookups).averages(found),
-            2 => Eightfold::<L::Single, 2>::new(self, pyramid, lookups).averages(found),
-            3 => Eightfold::<L::Single, 3>::new(self, pyramid, lookups).averages(found),
+            // Two are stored as three.
+            2 | 3 => Eightfold::<L::Single, 3>::new(self, pyramid, lookups).averages(found),
             _ => Eightfold::<L::Single, 4>::new(self, pyramid, lookups).averages(found),
         }
     }
@@ -287,16 +287,16 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
     /// wait for another.
     #[inline(always)]
     fn sum(&self, means: &mut [Mean]) {
-        self.sum_at(0, means);
-        if matches!(self.sampler.filter, Filter::EwaVc(_)) {
-            return;
-        }
-        let mut coarser = [Mean::default(); LANES];
-        let coarser = &mut coarser[..means.len().min(LANES)];
-        self.sum_at(1, coarser);
-        for (lane, (mean, coarser)) in means.iter_mut().zip(coarser).enumerate() {
-            if self.levels[lane].share > 0.0 {
-                *mean = mean.mix(*coarser, self.levels[lane].share);
+        let count = if matches!(self.sampler.filter, Filter::EwaVc(_)) { 1 } else { 2 };
+        for next in 0..count {
+            let mut found = [Mean::default(); LANES];
+            self.sum_at(next, &mut found[..means.len().min(LANES)]);
+            for (lane, (mean, found)) in means.iter_mut().zip(found).enumerate() {
+                if next == 0 {
+                    *mean = found;
+                } else if self.levels[lane].share > 0.0 {
+                    *mean = mean.mix(found, self.levels[lane].share);
+                }
             }
         }
     }

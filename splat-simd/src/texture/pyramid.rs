@@ -19,7 +19,7 @@ const FAR: f64 = 64.0;
 /// row; rows are wrapped one at a time. (Channels by themselves, since eight weights then meet eight texels: interleaved
 /// ones need each weight four times.)
 ///
-/// Memory: 16/3 bytes a texel and channel, and the borders: 8 to 16 texels a row. A row of a mirrored texture
+/// Memory: 16/3 bytes a texel and channel (two channels take as much as three), and the borders: 8 to 16 texels a row. A row of a mirrored texture
 /// stands twice.
 #[derive(Debug, Clone)]
 pub struct LanePyramid {
@@ -334,7 +334,8 @@ fn reduced(position: f32, wrap: Wrap) -> f64 {
 fn logarithm(x: f32) -> f32 {
     let z = (x - 1.0) / (x + 1.0);
     let z2 = z * z;
-    let series = ((((z2 / 11.0 + 1.0 / 9.0) * z2 + 1.0 / 7.0) * z2 + 0.2) * z2 + 1.0 / 3.0) * z2 + 1.0;
+    let [a, b, c, d, e] = [1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0];
+    let series = ((((e * z2 + d) * z2 + c) * z2 + b) * z2 + a) * z2 + 1.0;
     2.0 * std::f32::consts::LOG2_E * z * series
 }
 
@@ -356,7 +357,9 @@ fn level(pyramid: &Pyramid, index: usize, unit: f32) -> LaneLevel {
     let channels = pyramid.channels();
     let plane = (i64::from(height) + black) as usize * columns.stride;
     let distance = plane + APART;
-    let mut texels = vec![0.0; distance * channels];
+    // Kernels are compiled for 1, 3 and 4 channels.
+    let stored = if channels == 2 { 3 } else { channels };
+    let mut texels = vec![0.0; distance * stored];
     for y in 0..plane / columns.stride {
         for column in 0..columns.stride {
             // The black row, too, stands where the pyramid is black.
