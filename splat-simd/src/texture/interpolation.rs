@@ -125,7 +125,7 @@ impl ProbeRow {
         let [total, ..] = L::sums([total; 4]);
         let mut mean = sums.sums::<C>();
         for value in &mut mean[..C] {
-            *value = *value / total;
+            *value /= total;
         }
         (mean, sums.texels)
     }

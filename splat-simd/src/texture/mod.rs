@@ -1,8 +1,8 @@
 //! Texture lookups by lanes: the filters of [`splat_core::texture`], eight texels at once.
 //!
-//! A lookup has three steps. The set-up ([`ellipse`]) turns footprints into ellipses and those into kernels, for eight
-//! lookups at once, one a lane. Each lookup then finds its level and its place there, in `f64`. The sums ([`rows`],
-//! [`interpolation`]) read the texels of one lookup, eight of a row at once, from a [`LanePyramid`].
+//! A lookup has three steps. The set-up (`ellipse`) turns footprints into ellipses and those into kernels, for eight
+//! lookups at once, one a lane. Each lookup then finds its level and its place there, in `f64`. The sums (`rows`,
+//! `interpolation`) read the texels of one lookup, eight of a row at once, from a [`LanePyramid`].
 //!
 //! All arithmetic is in `f32`, each operation rounded, sums in a fixed order: a lookup has the same bits at every level, in
 //! every batch, on every thread. They are not those of the scalar filters, whose sums are `f64`, but within some roundings
