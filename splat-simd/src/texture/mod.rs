@@ -1,8 +1,8 @@
 //! Texture lookups by lanes: the filters of [`splat_core::texture`], eight texels at once.
 //!
-//! A lookup has three steps. The set-up ([`ellipse`]) turns footprints into ellipses and those into kernels, for eight
-//! lookups at once, one a lane. Each lookup then finds its level and its place there, in `f64`. The sums ([`rows`],
-//! [`interpolation`]) read the texels of one lookup, eight of a row at once, from a [`LanePyramid`].
+//! A lookup has three steps. The set-up (`ellipse`) turns footprints into ellipses and those into kernels, for eight
+//! lookups at once, one a lane. Each lookup then finds its level and its place there, in `f64`. The sums (`rows`,
+//! `interpolation`) read the texels of one lookup, eight of a row at once, from a [`LanePyramid`].
 //!
 //! All arithmetic is in `f32`, each operation rounded, sums in a fixed order: a lookup has the same bits at every level, in
 //! every batch, on every thread. They are not those of the scalar filters, whose sums are `f64`, but within some roundings
@@ -85,12 +85,13 @@ impl LaneSampler {
     /// The same with its cost: texels that were loaded, those of weight zero included.
     pub fn average(&self, level: Level, pyramid: &LanePyramid, st: Vec2, footprint: &Footprint) -> Average {
         let mut found = [Average::default()];
-        let lookups = &[Lookup { st, footprint: *footprint }];
-        level.run_single(Batch { sampler: self, pyramid, lookups, found: &mut found });
+        self.lookups(level, pyramid, &[Lookup { st, footprint: *footprint }], &mut found);
         found[0]
     }
 
     /// Many lookups; as many as `found` has entries. Each is what it is alone, whatever else is looked up with it.
+    // One copy of the kernels is enough.
+    #[inline(never)]
     pub fn lookups(&self, level: Level, pyramid: &LanePyramid, lookups: &[Lookup], found: &mut [Average]) {
         level.run_single(Batch { sampler: self, pyramid, lookups, found });
     }
@@ -235,17 +236,12 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
     fn averages(&self, found: &mut [Average]) {
         let mut means = [Mean::default(); LANES];
         let means = &mut means[..found.len().min(LANES)];
-        match self.sampler.filter {
-            Filter::EwaVc(_) | Filter::Ewa | Filter::EwaPrinted => self.sum(means),
-            Filter::Trilinear => {
-                for (lane, mean) in means.iter_mut().enumerate() {
-                    *mean = self.probed(lane, ProbeRow::ONE);
-                }
-            }
-            Filter::Assembly(probes) => {
-                for (lane, mean) in means.iter_mut().enumerate() {
-                    *mean = self.probed(lane, self.row(lane, probes));
-                }
+        let is_summed = matches!(self.sampler.filter, Filter::EwaVc(_) | Filter::Ewa | Filter::EwaPrinted);
+        if is_summed {
+            self.sum(means);
+        } else {
+            for (lane, mean) in means.iter_mut().enumerate() {
+                *mean = self.probed(lane);
             }
         }
         let [only_magnifying, only_filtering] = MAGNIFYING;
@@ -253,10 +249,9 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
             let share = (self.axes[0][lane] - only_magnifying) / (only_filtering - only_magnifying);
             let Mean { color, texels } = if share >= 1.0 {
                 *mean
-            } else if share > 0.0 {
-                self.magnified(lane).mix(*mean, share)
             } else {
-                self.magnified(lane)
+                let magnified = self.magnified(lane);
+                if share > 0.0 { magnified.mix(*mean, share) } else { magnified }
             };
             *found = Average { color, texels };
             for value in &mut found.color {
@@ -327,7 +322,11 @@ impl<'a, L: Lanes, const C: usize> Eightfold<'a, L, C> {
 
     /// A row of probes at one level, or at two.
     #[inline(always)]
-    fn probed(&self, lane: usize, row: ProbeRow) -> Mean {
+    fn probed(&self, lane: usize) -> Mean {
+        let row = match self.sampler.filter {
+            Filter::Assembly(probes) => self.row(lane, probes),
+            _ => ProbeRow::ONE,
+        };
         let Between { finer, share } = self.levels[lane];
         let level = |index: usize, share: f32| {
             let index = index.min(self.pyramid.levels.len() - 1);

@@ -309,8 +309,8 @@ impl<L: Lanes, const C: usize> Sums<L, C> {
     #[inline(always)]
     fn add(&mut self, weight: L, texels: [&Eight; C]) {
         self.weight = self.weight + weight;
-        for channel in 0..C {
-            self.colors[channel] = self.colors[channel] + weight * L::load(texels[channel]);
+        for (color, texels) in self.colors.iter_mut().zip(texels) {
+            *color = *color + weight * L::load(texels);
         }
     }
 }

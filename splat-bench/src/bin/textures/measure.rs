@@ -187,8 +187,8 @@ fn texels(found: &[Average]) -> f64 {
 fn errors(found: &[Average], truths: &[[f64; 4]], channels: usize) -> [f64; 2] {
     let (mut sum, mut greatest) = (0.0, 0.0_f64);
     for (average, truth) in found.iter().zip(truths) {
-        for channel in 0..channels {
-            let error = f64::from(average.color[channel]) - truth[channel];
+        for (&value, truth) in average.color.iter().zip(truth).take(channels) {
+            let error = f64::from(value) - truth;
             sum += error * error;
             greatest = greatest.max(error.abs());
         }

@@ -1,6 +1,6 @@
 //! Averages of a pyramid over a footprint. Seeds 1 and 2, with the errata E1 to E14 of docs/specification.md.
 //!
-//! [`Sampler::lookup`] is the scalar reference. A lookup has a set-up of its own, in `f64`, that other cores share:
+//! [`Sampler::lookup`] is the scalar reference. A lookup has a set-up of its own, in `f64`:
 //! [`Ellipse`] (the sanitised footprint in texels), then [`RowKernel`] (an ellipse at one level, summed row by row)
 //! or [`ProbeRow`].
 
