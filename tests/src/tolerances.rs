@@ -504,7 +504,13 @@ pub const SKY_TEXEL: f64 = 0.015;
 /// radius) times the part that the pixel has, plus a semi-axis of 1/sqrt(KERNEL_VARIANCE) = 2.71 times the root of the
 /// other part: at most sqrt(2^2 + 2.71^2) with equality where both have half.
 pub const LOOKUP_REACH: f64 = 3.4;
-/// TEMP
+
+/// Colours of image textures in both engines, for texels in [0, 1]: a lookup by lanes and a scalar one are within some 16
+/// roundings of 2^-24 of each other where both decide for the same level of the pyramid, and so is a mean of them.
+pub const ENGINES_COLORS: f64 = 2e-6;
+
+// ---------------------------------------------------------------------------------------------------------
+// Texture lookups by lanes
 
 /// A texture lookup by lanes against the scalar one, for values in [0, 1], per anisotropy A. In `f32`: the ellipse takes some
 /// 30 roundings; a texel's place along a row of up to A half-widths is off by A ulps, r2 by twice and the weight by four
@@ -524,7 +530,3 @@ pub const LANES_CONSTANT: f64 = 5e-6;
 /// How far a mean by lanes may leave the range of its values, relative to the greatest of them: as for
 /// [`LANES_CONSTANT`].
 pub const LANES_RANGE: f64 = 5e-6;
-
-/// Colours of image textures in both engines, for texels in [0, 1]: a lookup by lanes and a scalar one are within some 16
-/// roundings of 2^-24 of each other where both decide for the same level of the pyramid, and so is a mean of them.
-pub const ENGINES_COLORS: f64 = 2e-6;
