@@ -5,6 +5,7 @@
 
 use crate::random::Random;
 use glam::{DVec2, Vec2};
+use proptest::prelude::*;
 use splat_core::texture::{Footprint, Pyramid, Texels, Wrap};
 
 /// An image in linear light, channels interleaved.
@@ -144,4 +145,26 @@ impl Lookup {
         let semi_axes = [cos * major + sin * minor, cos * minor - sin * major];
         Footprint { semi_axes: semi_axes.map(|axis| (axis / size).as_vec2()) }
     }
+}
+
+/// All wraps.
+pub const WRAPS: [Wrap; 4] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror, Wrap::Black];
+
+/// For each size and wrap two pyramids, of 1 to 4 channels: of values in [0, 1], and of values as large as they come.
+pub fn pyramids_of_noise(sizes: &[[u32; 2]]) -> Vec<Pyramid> {
+    let mut pyramids = Vec::new();
+    for (i, &size) in sizes.iter().enumerate() {
+        for wrap in WRAPS {
+            let mut image = Image::noise(size, 1 + i % 4, 17);
+            pyramids.push(image.pyramid(wrap));
+            image.values.iter_mut().for_each(|value| *value = (2.0 * *value - 1.0) * f32::MAX);
+            pyramids.push(image.pyramid(wrap));
+        }
+    }
+    pyramids
+}
+
+/// Any bits; half of the time such as footprints have.
+pub fn any_float() -> impl Strategy<Value = f32> {
+    prop_oneof![any::<u32>().prop_map(f32::from_bits), -2.0_f32..2.0, Just(0.0), -0.05_f32..0.05]
 }

@@ -7,15 +7,13 @@ use splat_core::texture::{
     Filter, Footprint, Magnification, Probes, Pyramid, Quality, Sampler, SummedArea, Texels, Wrap,
 };
 use splat_tests::random::Random;
-use splat_tests::texture_truth::{Image, Lookup};
+use splat_tests::texture_truth::{Image, Lookup, WRAPS, any_float, pyramids_of_noise};
 use splat_tests::tolerances as tol;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
 /// Minor semi-axes, in texels: of pictures at about the texture's size, and of smaller ones.
 const MINORS: [[f64; 2]; 2] = [[0.75, 3.0], [2.0, 8.0]];
-
-const WRAPS: [Wrap; 4] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror, Wrap::Black];
 
 const FILTERS: [Filter; 9] = [
     Filter::Trilinear,
@@ -315,24 +313,8 @@ fn the_bound_on_time_is_of_the_right_order() {
 }
 
 /// Pyramids of all kinds of sizes and values.
-static PYRAMIDS: LazyLock<Vec<Pyramid>> = LazyLock::new(|| {
-    let mut pyramids = Vec::new();
-    for (i, size) in [[16, 16], [7, 5], [300, 1], [1, 1], [33, 100], [2, 65]].into_iter().enumerate() {
-        for wrap in WRAPS {
-            let mut image = Image::noise(size, 1 + i % 4, 17);
-            pyramids.push(image.pyramid(wrap));
-            image.values.iter_mut().for_each(|value| *value = 2.0 * *value - 1.0);
-            image.values.iter_mut().for_each(|value| *value *= f32::MAX);
-            pyramids.push(image.pyramid(wrap));
-        }
-    }
-    pyramids
-});
-
-/// Any bits; half of the time such as footprints have.
-fn any_float() -> impl Strategy<Value = f32> {
-    prop_oneof![any::<u32>().prop_map(f32::from_bits), -2.0_f32..2.0, Just(0.0), -0.05_f32..0.05]
-}
+static PYRAMIDS: LazyLock<Vec<Pyramid>> =
+    LazyLock::new(|| pyramids_of_noise(&[[16, 16], [7, 5], [300, 1], [1, 1], [33, 100], [2, 65]]));
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2500, failure_persistence: None, ..ProptestConfig::default() })]

@@ -9,11 +9,9 @@ use splat_core::texture::{
 use splat_simd::Level;
 use splat_simd::texture::{LanePyramid, LaneSampler, Lookup as Request};
 use splat_tests::random::Random;
-use splat_tests::texture_truth::{Image, Lookup};
+use splat_tests::texture_truth::{Image, Lookup, WRAPS, any_float, pyramids_of_noise};
 use splat_tests::tolerances as tol;
 use std::sync::LazyLock;
-
-const WRAPS: [Wrap; 4] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror, Wrap::Black];
 
 /// All that lanes have: the printed EWA is the reference's alone.
 const FILTERS: [Filter; 8] = [
@@ -250,26 +248,12 @@ fn most_loaded(filter: Filter, anisotropy: f64) -> f64 {
 
 /// Pyramids of all kinds of sizes and values.
 static PYRAMIDS: LazyLock<Vec<(Pyramid, LanePyramid)>> = LazyLock::new(|| {
-    let mut pyramids = Vec::new();
-    for (i, size) in SIZES.into_iter().enumerate() {
-        for wrap in WRAPS {
-            let mut image = Image::noise(size, 1 + i % 4, 17);
-            pyramids.push(image.pyramid(wrap));
-            image.values.iter_mut().for_each(|value| *value = (2.0 * *value - 1.0) * f32::MAX);
-            pyramids.push(image.pyramid(wrap));
-        }
-    }
     let prepared = |pyramid: Pyramid| {
         let lanes = LanePyramid::new(&pyramid);
         (pyramid, lanes)
     };
-    pyramids.into_iter().map(prepared).collect()
+    pyramids_of_noise(&SIZES).into_iter().map(prepared).collect()
 });
-
-/// Any bits; half of the time such as footprints have.
-fn any_float() -> impl Strategy<Value = f32> {
-    prop_oneof![any::<u32>().prop_map(f32::from_bits), -2.0_f32..2.0, Just(0.0), -0.05_f32..0.05]
-}
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
