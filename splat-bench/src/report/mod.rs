@@ -101,7 +101,7 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     let mut context = Context {
         quick,
         repetitions: if quick { 2 } else { 5 },
-        width: if quick { 240 } else { 480 },
+        width: if quick { 160 } else { 480 },
         truth_side: 23,
         cache: choices.cache.clone(),
         figures: Figures::default(),

@@ -84,12 +84,12 @@ fn defocus(width: u32) -> anyhow::Result<Subjects> {
     let sphere = sphere_scene(width)?;
     let mut camera = sphere.camera;
     if let Projection::Perspective { lens, .. } = &mut camera.projection {
-        // The circle of confusion of the sphere's centre has a radius of 10 pixels of a frame of 480.
-        *lens = Some(splat_core::Lens { radius: 0.077, focus: 1.0, blades: 0 });
+        // The circle of confusion of the sphere's centre has a radius of 5 pixels of a frame of 480.
+        *lens = Some(splat_core::Lens { radius: 0.0385, focus: 1.0, blades: 0 });
     }
     Ok(Subjects {
         name: "defocus",
-        about: "the sphere through a lens; its centre is blurred over a radius of 10/480 of the width",
+        about: "the sphere through a lens; its centre is blurred over a radius of 5/480 of the width",
         camera,
         ..sphere
     })

@@ -15,12 +15,12 @@ use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::evaluate::{Hit, LensPoint, Limits, SplatConstants};
 use splat_core::sampling::SampleTable;
 use splat_core::setup::{View, camera_splat, half_depth, project, splat_color};
-use splat_core::{Camera, Cloud, Kernel, PixelFilter, RenderOptions, Shading, Shapes};
+use splat_core::{Camera, Cloud, Kernel, Lens, PixelFilter, RenderOptions, Shading, Shapes};
 use std::f64::consts::TAU;
 use std::path::Path;
 
 /// To be raised with every change of what is computed here, so that no older picture is taken from the cache.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Side of the square of pixels that a task renders.
 const TILE: i32 = 16;
@@ -61,7 +61,9 @@ struct Splat {
     constants: SplatConstants<f64>,
     /// Least and greatest x, then y, in pixels, of where it may be hit.
     bounds: [[f64; 2]; 2],
-    index: usize,
+    /// With a lens: where m = d + p defocus lies for every hit, relative to the reference point's projection, x and y.
+    sharp: [[f64; 2]; 2],
+    depth: f64,
     weight_scale: f64,
     back: bool,
     ke: f64,
@@ -108,7 +110,12 @@ impl<'a> Exact<'a> {
         };
         let view = View::new(camera, options);
         let splats = (0..cloud.len()).filter(|&i| cloud.defect(i).is_none());
-        let splats = splats.filter_map(|index| Splat::new(cloud, index, &view, options)).collect();
+        // A pinhole's culling concerns whole splats.
+        let hidden = |splat: &Splat| options.cull && splat.back && view.lens.is_none();
+        let splats = splats.filter_map(|index| Splat::new(cloud, index, &view, options));
+        let mut splats: Vec<Splat> = splats.filter(|splat| !hidden(splat)).collect();
+        // For no other reason than that nearly sorted fragments are soon sorted.
+        splats.sort_by(|a, b| a.back.cmp(&b.back).then(a.depth.total_cmp(&b.depth)));
         Self {
             limits: Limits::new(options.cutoff, camera.near, camera.far),
             rim: libm::exp(-0.5 * options.cutoff),
@@ -135,13 +142,53 @@ impl<'a> Exact<'a> {
         (0..self.splats.len() as u32).filter(|&i| meets(&self.splats[i as usize])).collect()
     }
 
+    /// Whether a splat may be hit from within a square of the picture, given its least corner and its side, in pixels.
+    fn may_be_hit(&self, splat: &Splat, corner: [f64; 2], side: f64) -> bool {
+        let meets = |i: usize| splat.bounds[i][0] <= corner[i] + side && corner[i] <= splat.bounds[i][1];
+        if !(meets(0) && meets(1)) {
+            return false;
+        }
+        if self.view.lens.is_some() || self.view.orthographic {
+            return true;
+        }
+        // For a pinhole u g, v g and g are linear in the sample's place, and |u|, |v| < R, |u +- v| < sqrt(2) R.
+        let c = &splat.constants;
+        let center = c.pixel();
+        let d = [corner[0] + 0.5 * side - center.x, corner[1] + 0.5 * side - center.y];
+        let u = [c.reference[0], c.reference[0] * c.h[0], c.reference[0] * c.h[1] + c.a1];
+        let v = [c.reference[1], c.reference[1] * c.h[0] + c.b[0], c.reference[1] * c.h[1] + c.b[1]];
+        let g = [1.0, c.h[0], c.h[1]];
+        let radius = self.view.radius * (1.0 + 1e-9);
+        // The greatest value of the linear function a over the square.
+        let greatest =
+            |a: [f64; 3]| a[0] + a[1] * d[0] + a[2] * d[1] + 0.5 * side * (a[1].abs() + a[2].abs());
+        let diagonal = radius * std::f64::consts::SQRT_2;
+        [(1.0, 0.0, radius), (0.0, 1.0, radius), (1.0, 1.0, diagonal), (1.0, -1.0, diagonal)].iter().all(
+            |&(along_u, along_v, radius)| {
+                [1.0, -1.0].iter().all(|sign| {
+                    let a = [0, 1, 2].map(|i| radius * g[i] + sign * (along_u * u[i] + along_v * v[i]));
+                    greatest(a) >= 0.0
+                })
+            },
+        )
+    }
+
     /// The hit of a sample of the pixel (x, y).
+    #[inline(always)]
     fn hit(&self, splat: &Splat, [x, y]: [i32; 2], sample: &Sample) -> Option<Hit<f64>> {
         let d = splat.constants.offset(x, y, sample.jitter);
         match self.view.lens {
             _ if self.view.orthographic => splat.constants.orthographic(d, &self.limits),
             None => splat.constants.pinhole(d, &self.limits),
-            Some(_) => splat.constants.thin_lens(d, &sample.lens, &self.limits),
+            Some(_) => {
+                let (p, sharp) = (sample.lens.p, &splat.sharp);
+                let inside = |i: usize| {
+                    let m = d[i] + p[i] * splat.constants.defocus;
+                    sharp[i][0] <= m && m <= sharp[i][1]
+                };
+                let possible = inside(0) && inside(1);
+                if possible { splat.constants.thin_lens(d, &sample.lens, &self.limits) } else { None }
+            }
         }
     }
 
@@ -231,13 +278,14 @@ impl<'a> Exact<'a> {
 
     /// The picture of every filter, with `side`^2 samples in each pixel's square.
     pub fn truth(&self, side: u32, seed: u64) -> Truth {
+        let patterns: Vec<Pattern> = (0..PATTERNS).map(|i| Pattern::new(side, seed ^ (i << 32))).collect();
         let [width, height] = self.view.frame.map(|side| side as i32);
         // Filters reach one pixel beyond a pixel's own square, so there are squares around the frame, too.
         let tiles: Vec<[i32; 2]> = (-1..=height)
             .step_by(TILE as usize)
             .flat_map(|y| (-1..=width).step_by(TILE as usize).map(move |x| [x, y]))
             .collect();
-        let parts: Vec<Sums> = tiles.par_iter().map(|&tile| self.tile(tile, side, seed)).collect();
+        let parts: Vec<Sums> = tiles.par_iter().map(|&tile| self.tile(tile, &patterns, seed)).collect();
         let mut sums = Sums::new([-2, -2], [width + TILE + 4, height + TILE + 4]);
         for part in &parts {
             sums.add(part);
@@ -247,7 +295,7 @@ impl<'a> Exact<'a> {
     }
 
     /// The sums to which a tile's squares contribute.
-    fn tile(&self, [x0, y0]: [i32; 2], side: u32, seed: u64) -> Sums {
+    fn tile(&self, [x0, y0]: [i32; 2], patterns: &[Pattern], seed: u64) -> Sums {
         let [width, height] = self.view.frame.map(|side| side as i32);
         let (x1, y1) = ((x0 + TILE).min(width + 1), (y0 + TILE).min(height + 1));
         let mut sums = Sums::new([x0 - 1, y0 - 1], [TILE + 2, TILE + 2]);
@@ -255,43 +303,49 @@ impl<'a> Exact<'a> {
         let (mut samples, mut fragments, mut candidates) = (Vec::new(), Vec::new(), Vec::new());
         for y in y0..y1 {
             for x in x0..x1 {
-                self.even_samples([x, y], side, seed, &mut samples);
-                let (low, high) = ([x, y].map(f64::from), [x + 1, y + 1].map(f64::from));
+                let pattern = self.even_samples([x, y], patterns, seed, &mut samples);
+                let corner = [x, y].map(f64::from);
                 candidates.clear();
-                candidates.extend(of_tile.iter().copied().filter(|&i| {
-                    let bounds = &self.splats[i as usize].bounds;
-                    (0..2).all(|i| bounds[i][0] <= high[i] && low[i] <= bounds[i][1])
-                }));
-                let samples = &samples;
-                self.samples([x, y], samples, &candidates, &mut fragments, |number, color| {
-                    sums.add_sample([x, y], samples[number].jitter, color);
+                let may_be_hit = |&i: &u32| self.may_be_hit(&self.splats[i as usize], corner, 1.0);
+                candidates.extend(of_tile.iter().copied().filter(may_be_hit));
+                let mut around = [[[0.0; 5]; 4]; 9];
+                self.samples([x, y], &samples, &candidates, &mut fragments, |number, color| {
+                    add_sample(&mut around, &pattern.weights[number], color);
                 });
+                sums.add_around([x, y], &around);
             }
         }
         sums
     }
 
-    /// A jittered grid over a pixel's square, and over the lens one in a random order.
-    fn even_samples(&self, [x, y]: [i32; 2], side: u32, seed: u64, samples: &mut Vec<Sample>) {
+    /// A pixel's samples: one of the patterns, and over the lens a jittered grid in a random order.
+    fn even_samples<'p>(
+        &self,
+        [x, y]: [i32; 2],
+        patterns: &'p [Pattern],
+        seed: u64,
+        samples: &mut Vec<Sample>,
+    ) -> &'p Pattern {
         let place = (u64::from(x as u32) << 32) | u64::from(y as u32);
         let mut random = SplitMix(seed ^ SplitMix(place).next());
-        let cell = |i: u32, random: &mut SplitMix| (f64::from(i) + random.unit()) / f64::from(side);
+        let pattern = &patterns[random.next() as usize % patterns.len()];
         samples.clear();
-        for i in 0..side * side {
-            let jitter = [cell(i % side, &mut random), cell(i / side, &mut random)];
-            samples.push(Sample { jitter, lens: LensPoint { p: [0.0; 2] } });
-        }
-        let Some(lens) = self.view.lens else { return };
+        let lens = LensPoint { p: [0.0; 2] };
+        samples.extend(pattern.jitter.iter().map(|&jitter| Sample { jitter, lens }));
+        let Some(lens) = self.view.lens else { return pattern };
+        let side = pattern.side;
         let mut order: Vec<u32> = (0..side * side).collect();
         for i in (1..order.len()).rev() {
             order.swap(i, (random.unit() * (i + 1) as f64) as usize);
         }
         for (sample, &i) in samples.iter_mut().zip(&order) {
             // Equal areas to equal areas; the truth knows round lenses only.
-            let (radius, angle) = (cell(i % side, &mut random).sqrt(), TAU * cell(i / side, &mut random));
+            let [first, second] = random.in_cell(i, side);
+            let (radius, angle) = (first.sqrt(), TAU * second);
             let unit = [radius * libm::cos(angle), radius * libm::sin(angle)];
             sample.lens.p = [0, 1].map(|axis| unit[axis] * lens.radius * self.view.pixel_scale[axis]);
         }
+        pattern
     }
 
     /// The picture with the renderer's own samples: what is left is the error of its arithmetic.
@@ -308,8 +362,7 @@ impl<'a> Exact<'a> {
                 [x0, y0].map(|low| f64::from(low) - reach),
                 [x1, y1].map(|high| f64::from(high) + reach),
             ]);
-            let mut fragments = Vec::new();
-            let mut pixels = Vec::new();
+            let (mut fragments, mut candidates, mut pixels) = (Vec::new(), Vec::new(), Vec::new());
             for y in y0..y1 {
                 for x in x0..x1 {
                     let jitter = table.jitter(x, y).iter().map(|jitter| jitter.map(f64::from));
@@ -320,8 +373,14 @@ impl<'a> Exact<'a> {
                             lens: LensPoint { p: lens.next().unwrap_or([0.0; 2]) },
                         })
                         .collect();
+                    let corner = [x, y].map(|low| f64::from(low) - reach);
+                    candidates.clear();
+                    let may_be_hit = |&i: &u32| {
+                        self.may_be_hit(&self.splats[i as usize], corner, 1.0 + 2.0 * reach)
+                    };
+                    candidates.extend(of_tile.iter().copied().filter(may_be_hit));
                     let mut sum = [0.0; 4];
-                    self.samples([x, y], &samples, &of_tile, &mut fragments, |_, color| {
+                    self.samples([x, y], &samples, &candidates, &mut fragments, |_, color| {
                         sum = [0, 1, 2, 3].map(|i| sum[i] + color[i]);
                     });
                     pixels.push((y * width + x, sum.map(|sum| sum / samples.len() as f64)));
@@ -356,7 +415,23 @@ impl Splat {
                 f64::INFINITY
             },
         ) * (1.0 + 1e-9);
-        let bounds = [0, 1].map(|axis| bounds(splat.center, sphere, extent, view, axis));
+        let depths = [(splat.center.z - extent).max(view.near), splat.center.z + extent];
+        let image = [0, 1].map(|axis| image(splat.center, sphere, depths, view, axis));
+        let bounds = [0, 1].map(|axis| {
+            // The circle of confusion.
+            let blur = |lens: Lens| lens.radius * farthest(1.0 / lens.focus, depths) * view.pixel_scale[axis];
+            let blur = view.lens.map_or(0.0, blur);
+            [image[axis][0] - blur, image[axis][1] + blur]
+        });
+        // A hit at depth w that a pinhole would see at d' has m = d' + p (1/wr - 1/w).
+        let reference = constants.pixel().to_array();
+        let sharp = [0, 1].map(|axis| {
+            let spread = |lens: Lens| {
+                lens.radius * farthest(1.0 / constants.depth, depths) * view.pixel_scale[axis]
+            };
+            let spread = view.lens.map_or(0.0, spread) + 1e-6;
+            [image[axis][0] - reference[axis] - spread, image[axis][1] - reference[axis] + spread]
+        });
         // |T1 x T2| in the world, where areas are.
         let world_area = match &cloud.shapes {
             Shapes::Discs(sizes) => f64::from(sizes[index]).powi(2),
@@ -387,7 +462,8 @@ impl Splat {
         Some(Self {
             constants,
             bounds,
-            index,
+            sharp,
+            depth: splat.center.z,
             weight_scale,
             back: splat.back,
             ke,
@@ -410,19 +486,21 @@ fn kernel_integral(options: &RenderOptions) -> f64 {
     }
 }
 
-/// Least and greatest coordinate, in pixels, at which a disc of this depth extent within a sphere may be hit.
-fn bounds(center: DVec3, sphere: f64, extent: f64, view: &View, axis: usize) -> [f64; 2] {
+/// Least and greatest coordinate, in pixels, at which a pinhole or an orthographic camera sees what lies between two depths
+/// within a sphere.
+fn image(center: DVec3, sphere: f64, [near, far]: [f64; 2], view: &View, axis: usize) -> [f64; 2] {
     let (low, high) = (center[axis] - sphere, center[axis] + sphere);
-    let [low, high] = if view.orthographic {
+    let extent = if view.orthographic {
         [low, high]
     } else {
-        let (near, far) = ((center.z - extent).max(view.near), center.z + extent);
-        let blur = view.lens.map_or(0.0, |lens| {
-            lens.radius * (1.0 / near - 1.0 / lens.focus).abs().max((1.0 / far - 1.0 / lens.focus).abs())
-        });
-        [(low / near).min(low / far) - blur, (high / near).max(high / far) + blur]
+        [(low / near).min(low / far), (high / near).max(high / far)]
     };
-    [low, high].map(|value| value * view.pixel_scale[axis] + view.principal_point[axis])
+    extent.map(|value| value * view.pixel_scale[axis] + view.principal_point[axis])
+}
+
+/// How far the reciprocal of a depth may be from a number.
+fn farthest(inverse: f64, depths: [f64; 2]) -> f64 {
+    (1.0 / depths[0] - inverse).abs().max((1.0 / depths[1] - inverse).abs())
 }
 
 /// The sums of the samples around each pixel of a rectangle, for each filter: colour, alpha, weight.
@@ -441,19 +519,12 @@ impl Sums {
         ((y - self.first[1]) * self.size[0] + x - self.first[0]) as usize
     }
 
-    /// Adds a sample of the square (x, y) to the pixels around it.
-    fn add_sample(&mut self, [x, y]: [i32; 2], jitter: [f64; 2], color: [f64; 4]) {
-        let values = [color[0], color[1], color[2], color[3], 1.0];
-        let weights = jitter.map(|jitter| densities(jitter - 0.5));
-        for (row, dy) in [-1, 0, 1].into_iter().enumerate() {
-            for (column, dx) in [-1, 0, 1].into_iter().enumerate() {
-                let index = self.index([x + dx, y + dy]);
-                for (filter, sums) in self.all[index].iter_mut().enumerate() {
-                    let weight = weights[0][column][filter] * weights[1][row][filter];
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        *sum += weight * value;
-                    }
-                }
+    /// Adds the sums that a square's samples make for the pixels around it.
+    fn add_around(&mut self, [x, y]: [i32; 2], around: &Around) {
+        for (i, sums) in around.iter().enumerate() {
+            let index = self.index([x + i as i32 % 3 - 1, y + i as i32 / 3 - 1]);
+            for (sum, value) in self.all[index].as_flattened_mut().iter_mut().zip(sums.as_flattened()) {
+                *sum += value;
             }
         }
     }
@@ -476,6 +547,42 @@ impl Sums {
     fn mean(&self, at: [i32; 2], filter: usize) -> [f64; 4] {
         let [red, green, blue, alpha, weight] = self.all[self.index(at)][filter];
         [red, green, blue, alpha].map(|sum| sum / weight)
+    }
+}
+
+/// The sums for the three by three pixels around a square.
+type Around = [[[f64; 5]; 4]; 9];
+
+/// Adds a sample, given the densities of the filters along x and along y.
+fn add_sample(around: &mut Around, [along_x, along_y]: &[[[f64; 4]; 3]; 2], color: [f64; 4]) {
+    let values = [color[0], color[1], color[2], color[3], 1.0];
+    for (i, sums) in around.iter_mut().enumerate() {
+        for (filter, sums) in sums.iter_mut().enumerate() {
+            let weight = along_x[i % 3][filter] * along_y[i / 3][filter];
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += weight * value;
+            }
+        }
+    }
+}
+
+/// A jittered grid of samples over a pixel's square.
+struct Pattern {
+    side: u32,
+    jitter: Vec<[f64; 2]>,
+    /// For each sample, along x and along y, the [`densities`].
+    weights: Vec<[[[f64; 4]; 3]; 2]>,
+}
+
+/// How many there are.
+const PATTERNS: u64 = 64;
+
+impl Pattern {
+    fn new(side: u32, seed: u64) -> Self {
+        let mut random = SplitMix(seed);
+        let jitter: Vec<[f64; 2]> = (0..side * side).map(|i| random.in_cell(i, side)).collect();
+        let weights = jitter.iter().map(|jitter| jitter.map(|jitter| densities(jitter - 0.5))).collect();
+        Self { side, jitter, weights }
     }
 }
 
@@ -519,6 +626,11 @@ impl SplitMix {
 
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A point of the cell i of a grid of side x side cells over the unit square.
+    fn in_cell(&mut self, i: u32, side: u32) -> [f64; 2] {
+        [i % side, i / side].map(|cell| (f64::from(cell) + self.unit()) / f64::from(side))
     }
 }
 
@@ -570,3 +682,7 @@ fn key(cloud: &Cloud, camera: &Camera, options: &RenderOptions, side: u32, seed:
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
     })
 }
+
+#[cfg(test)]
+#[path = "truth_tests.rs"]
+mod tests;
