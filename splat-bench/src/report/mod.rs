@@ -4,12 +4,16 @@
 //! and JSON are written, and their tables and plots into a [`html::Section`].
 
 mod baseline;
+mod convergence;
 mod figures;
 mod fit;
+mod hard;
 mod html;
 mod machine;
 mod metrics;
+mod parts;
 mod plot;
+mod scaling;
 mod scenes;
 mod timing;
 mod truth;
@@ -108,7 +112,13 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
         start: Instant::now(),
     };
     let (scenes, left_out) = scenes::all(context.width, choices.data.as_deref())?;
-    let sections = vec![whole::section(&scenes, &mut context)?];
+    let sections = vec![
+        whole::section(&scenes, &mut context)?,
+        parts::section(&scenes, &mut context)?,
+        convergence::section(&mut context)?,
+        hard::section(&mut context)?,
+        scaling::section(&mut context)?,
+    ];
     let machine = machine::describe();
     let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
     let run = baseline::Run {

@@ -1,6 +1,6 @@
 //! Times: the least of several repetitions, all that is compared taking turns.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The times of something, in milliseconds.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -13,6 +13,11 @@ impl Times {
         let result = work();
         self.0.push(start.elapsed().as_secs_f64() * 1e3);
         result
+    }
+
+    /// Adds a time that was measured elsewhere.
+    pub fn add(&mut self, time: Duration) {
+        self.0.push(time.as_secs_f64() * 1e3);
     }
 
     /// The least, in milliseconds.
