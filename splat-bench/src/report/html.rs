@@ -90,8 +90,7 @@ fn write_block(html: &mut String, block: &Block) {
             let cells = |tag: &str, cells: &[String]| {
                 cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>()
             };
-            let rows: String =
-                rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
+            let rows: String = rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
             writeln!(html, "<table>\n<tr>{}</tr>\n{rows}</table>", cells("th", names))
         }
     };

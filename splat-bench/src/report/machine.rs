@@ -9,9 +9,9 @@ pub fn describe() -> String {
         Some(line.split_once(':')?.1.trim().to_owned())
     });
     let count = std::thread::available_parallelism().map_or(1, usize::from);
-    let load = std::fs::read_to_string("/proc/loadavg").ok().and_then(|text| {
-        Some(format!(", load of the last minute {}", text.split_whitespace().next()?))
-    });
+    let load = std::fs::read_to_string("/proc/loadavg")
+        .ok()
+        .and_then(|text| Some(format!(", load of the last minute {}", text.split_whitespace().next()?)));
     format!(
         "{}, {count} processors, {} {}, level {}{}",
         model.unwrap_or_else(|| "unknown processor".into()),

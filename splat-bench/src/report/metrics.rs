@@ -20,10 +20,7 @@ pub fn distance(a: &[[f64; 4]], b: &[[f64; 4]]) -> Distance {
     assert_eq!(a.len(), b.len(), "pictures of the same size");
     let differences = || a.iter().zip(b).flat_map(|(a, b)| [0, 1, 2, 3].map(|i| (a[i] - b[i]).abs()));
     let squares: f64 = differences().map(|difference| difference * difference).sum();
-    Distance {
-        rmse: (squares / (4.0 * a.len() as f64)).sqrt(),
-        max: differences().fold(0.0, f64::max),
-    }
+    Distance { rmse: (squares / (4.0 * a.len() as f64)).sqrt(), max: differences().fold(0.0, f64::max) }
 }
 
 /// The mean of FLIP (Andersson et al. 2020) of two pictures before black, as 8-bit sRGB, at 67 pixels a degree.

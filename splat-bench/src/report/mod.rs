@@ -132,7 +132,9 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
             "Made by `cargo run --release -p splat-bench -- report{}` in {seconds:.0} seconds. Every figure comes from this run.",
             if quick { " --quick" } else { "" }
         ),
-        format!("Machine: {machine}. Times are the least of repetitions that take turns; a machine with other work makes them longer."),
+        format!(
+            "Machine: {machine}. Times are the least of repetitions that take turns; a machine with other work makes them longer."
+        ),
     ];
     introduction.extend(left_out);
     write(choices, &run, &html::page("splat: speed against error", &introduction, &sections))?;
@@ -146,8 +148,11 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
 fn write(choices: &Choices, run: &baseline::Run, page: &str) -> anyhow::Result<()> {
     let folder = &choices.out;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let files =
-        [("report.html", page.to_owned()), ("report.csv", run.figures.to_csv()), ("report.json", run.to_json()?)];
+    let files = [
+        ("report.html", page.to_owned()),
+        ("report.csv", run.figures.to_csv()),
+        ("report.json", run.to_json()?),
+    ];
     for (name, content) in files {
         let path = folder.join(name);
         std::fs::write(&path, content).with_context(|| path.display().to_string())?;
@@ -161,9 +166,8 @@ mod tests {
 
     #[test]
     fn arguments_are_understood_or_refused() {
-        let parse = |line: &str| {
-            Choices::parse(&line.split_whitespace().map(String::from).collect::<Vec<_>>())
-        };
+        let parse =
+            |line: &str| Choices::parse(&line.split_whitespace().map(String::from).collect::<Vec<_>>());
         let choices = parse("--quick --out a --cache b --compare c --data d").unwrap();
         assert!(choices.quick);
         assert_eq!([&choices.out, &choices.cache], [Path::new("a"), Path::new("b")]);

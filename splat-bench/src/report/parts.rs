@@ -45,9 +45,11 @@ fn tables(section: &mut Section, context: &mut Context) {
     ));
     let mut rows = Vec::new();
     let mut series: Vec<Series> = Vec::new();
-    for (kernel, name, cutoff) in
-        [(Kernel::Gaussian, "gaussian", 2.0), (Kernel::Windowed, "windowed", 4.0), (Kernel::Gaussian, "gaussian", 9.0)]
-    {
+    for (kernel, name, cutoff) in [
+        (Kernel::Gaussian, "gaussian", 2.0),
+        (Kernel::Windowed, "windowed", 4.0),
+        (Kernel::Gaussian, "gaussian", 9.0),
+    ] {
         let places: Vec<f32> = (0..COUNT)
             .map(|i| (i as f64 / COUNT as f64 * cutoff) as f32)
             .filter(|&r2| f64::from(r2) < cutoff)
@@ -85,12 +87,29 @@ fn tables(section: &mut Section, context: &mut Context) {
             );
             points.push((nanoseconds, max, (*mode).into()));
             rows.push(
-                [subject.clone(), (*mode).into(), number(max), number(mean), number(bias), number(nanoseconds)]
-                    .into(),
+                [
+                    subject.clone(),
+                    (*mode).into(),
+                    number(max),
+                    number(mean),
+                    number(bias),
+                    number(nanoseconds),
+                ]
+                .into(),
             );
         }
         let exp = times[TABLES.len()].least() * 1e6 / places.len() as f64;
-        rows.push([subject.clone(), "expf of libm".into(), String::new(), String::new(), String::new(), number(exp)].into());
+        rows.push(
+            [
+                subject.clone(),
+                "expf of libm".into(),
+                String::new(),
+                String::new(),
+                String::new(),
+                number(exp),
+            ]
+            .into(),
+        );
         series.push(Series { name: subject, points, joined: false });
     }
     section.table(&["kernel", "table", "max", "mean", "bias", "ns a value"], rows);
@@ -178,7 +197,9 @@ fn compare(subject: &Subject, samples: &[Sample]) -> Errors {
     let mut errors = Errors::default();
     let view = &subject.view;
     for &([x, y], jitter, unit) in samples {
-        let lens = |lens| (LensPoint::new(unit, lens, view.pixel_scale), LensPoint::new(unit, lens, view.pixel_scale));
+        let lens = |lens| {
+            (LensPoint::new(unit, lens, view.pixel_scale), LensPoint::new(unit, lens, view.pixel_scale))
+        };
         let none = (LensPoint { p: [0.0f32; 2] }, LensPoint { p: [0.0f64; 2] });
         let (lens32, lens64) = view.lens.map_or(none, lens);
         let d = subject.exact.offset(x, y, jitter.map(f64::from));
@@ -200,7 +221,8 @@ fn compare(subject: &Subject, samples: &[Sample]) -> Errors {
             (one, other) => {
                 errors.disagree += 1;
                 let r2 = one.map_or_else(|| other.map_or(f64::NAN, |hit| f64::from(hit.r2)), |hit| hit.r2);
-                let depth = one.map_or_else(|| other.map_or(f64::NAN, |hit| f64::from(hit.depth)), |hit| hit.depth);
+                let depth =
+                    one.map_or_else(|| other.map_or(f64::NAN, |hit| f64::from(hit.depth)), |hit| hit.depth);
                 // The one that hits is itself off by no more than the bound.
                 let explained = (r2 - view.cutoff).abs() <= 2.0 * bound.membership
                     || (depth - view.near).abs() <= 2.0 * bound.depth;
@@ -301,8 +323,17 @@ fn evaluation(section: &mut Section, context: &mut Context) {
     }
     section.table(
         &[
-            "splat", "hits", "|d(u, v)|, sigma", "bound", "|dw|/w", "bound", "|d weight|", "disagree", "outside the band",
-            "f32, ns", "f64, ns",
+            "splat",
+            "hits",
+            "|d(u, v)|, sigma",
+            "bound",
+            "|dw|/w",
+            "bound",
+            "|d weight|",
+            "disagree",
+            "outside the band",
+            "f32, ns",
+            "f64, ns",
         ],
         rows,
     );
@@ -347,7 +378,13 @@ fn candidates(section: &mut Section, scenes: &[Subjects], context: &mut Context)
         note("tests a fragment, boxes", Kind::Error, boxes);
         note("tests a fragment, fast core", Kind::Error, spans);
         note("hits outside the boxes", Kind::Error, outside as f64);
-        rows.push(vec![scene.name.into(), fragments.to_string(), number(boxes), number(spans), outside.to_string()]);
+        rows.push(vec![
+            scene.name.into(),
+            fragments.to_string(),
+            number(boxes),
+            number(spans),
+            outside.to_string(),
+        ]);
     }
     section.table(&["scene", "fragments", "boxes", "fast core", "outside"], rows);
     Ok(())

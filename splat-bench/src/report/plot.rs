@@ -72,27 +72,36 @@ impl Plot {
                 .collect();
             if series.joined {
                 let path: Vec<String> = places.iter().map(|([x, y], _)| format!("{x:.1},{y:.1}")).collect();
-                write_line(&mut svg, &format!(
-                    "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.3\"/>",
-                    path.join(" ")
-                ));
+                write_line(
+                    &mut svg,
+                    &format!(
+                        "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.3\"/>",
+                        path.join(" ")
+                    ),
+                );
             }
             for ([x, y], label) in places {
                 let (x_text, y_text) = (x + 5.0, y - 4.0);
-                write_line(&mut svg, &format!(
-                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>\
+                write_line(
+                    &mut svg,
+                    &format!(
+                        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>\
                      <text x=\"{x_text:.1}\" y=\"{y_text:.1}\" font-size=\"9\" fill=\"{color}\">{}</text>",
-                    escape(label)
-                ));
+                        escape(label)
+                    ),
+                );
             }
             let y = FRAME[2] + 8.0 + 16.0 * number as f64;
             let x = FRAME[1] + 15.0;
-            write_line(&mut svg, &format!(
-                "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\" fill=\"{color}\"/><text x=\"{}\" y=\"{}\">{}</text>",
-                x + 8.0,
-                y + 4.0,
-                escape(&series.name)
-            ));
+            write_line(
+                &mut svg,
+                &format!(
+                    "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\" fill=\"{color}\"/><text x=\"{}\" y=\"{}\">{}</text>",
+                    x + 8.0,
+                    y + 4.0,
+                    escape(&series.name)
+                ),
+            );
         }
         svg + "</svg>\n"
     }
@@ -103,34 +112,43 @@ impl Plot {
         let corner = ranges.map(|range| 10f64.powf(range[0]));
         for x in ticks(ranges[0]) {
             let [at, _] = place(x, corner[1]);
-            write_line(svg, &format!(
-                "<line x1=\"{at:.1}\" y1=\"{top}\" x2=\"{at:.1}\" y2=\"{bottom}\" stroke=\"#ddd\"/>\
+            write_line(
+                svg,
+                &format!(
+                    "<line x1=\"{at:.1}\" y1=\"{top}\" x2=\"{at:.1}\" y2=\"{bottom}\" stroke=\"#ddd\"/>\
                  <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-                bottom + 14.0,
-                number(x)
-            ));
+                    bottom + 14.0,
+                    number(x)
+                ),
+            );
         }
         for y in ticks(ranges[1]) {
             let [_, at] = place(corner[0], y);
-            write_line(svg, &format!(
-                "<line x1=\"{left}\" y1=\"{at:.1}\" x2=\"{right}\" y2=\"{at:.1}\" stroke=\"#ddd\"/>\
+            write_line(
+                svg,
+                &format!(
+                    "<line x1=\"{left}\" y1=\"{at:.1}\" x2=\"{right}\" y2=\"{at:.1}\" stroke=\"#ddd\"/>\
                  <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                left - 4.0,
-                at + 4.0,
-                number(y)
-            ));
+                    left - 4.0,
+                    at + 4.0,
+                    number(y)
+                ),
+            );
         }
         let (middle_x, middle_y) = (0.5 * (left + right), 0.5 * (top + bottom));
-        write_line(svg, &format!(
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\
+        write_line(
+            svg,
+            &format!(
+                "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>\
              <text x=\"{middle_x}\" y=\"{}\" text-anchor=\"middle\">{}</text>\
              <text transform=\"translate(14 {middle_y}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-            right - left,
-            bottom - top,
-            bottom + 34.0,
-            escape(&self.axes[0]),
-            escape(&self.axes[1])
-        ));
+                right - left,
+                bottom - top,
+                bottom + 34.0,
+                escape(&self.axes[0]),
+                escape(&self.axes[1])
+            ),
+        );
     }
 }
 
@@ -194,7 +212,8 @@ mod tests {
 
     #[test]
     fn an_empty_plot_is_no_trouble() {
-        let svg = Plot { title: String::new(), axes: [String::new(), String::new()], series: vec![] }.to_svg();
+        let svg =
+            Plot { title: String::new(), axes: [String::new(), String::new()], series: vec![] }.to_svg();
         assert!(svg.ends_with("</svg>\n"));
     }
 }

@@ -141,12 +141,7 @@ fn measure(
         let fragments = statistics.fragments as f64;
         let memory = statistics.drawn as f64 * size_of::<VisibleSplat>() as f64 / 1e6;
         let size = number(point.size);
-        context.figures.note_noisy(
-            [SECTION, axis, &size, "frame, ms"],
-            Kind::Time,
-            frame,
-            times[0].noise(),
-        );
+        context.figures.note_noisy([SECTION, axis, &size, "frame, ms"], Kind::Time, frame, times[0].noise());
         context.figures.note([SECTION, axis, &size, "memory of visible splats, MB"], Kind::Memory, memory);
         context.figures.note([SECTION, axis, &size, "fragments"], Kind::Plain, fragments);
         rows.push(vec![
@@ -162,13 +157,17 @@ fn measure(
     }
     section.heading(axis);
     section.table(
-        &[axis, "frame, ms", "set-up and tiles, ms", "fragments", "frame, ns a fragment", "visible splats, MB"],
+        &[
+            axis,
+            "frame, ms",
+            "set-up and tiles, ms",
+            "fragments",
+            "frame, ns a fragment",
+            "visible splats, MB",
+        ],
         rows,
     );
-    let series = vec![
-        series("frame", &curve),
-        series("set-up and tiles", &of_splats),
-    ];
+    let series = vec![series("frame", &curve), series("set-up and tiles", &of_splats)];
     let axes = [axis.to_owned(), "time, ms".to_owned()];
     section.blocks.push(Block::Plot(Plot { title: format!("Time against {axis}"), axes, series }));
     if let (Some(frame), Some(setup)) = (exponent(&curve), exponent(&of_splats)) {

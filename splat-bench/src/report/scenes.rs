@@ -37,7 +37,9 @@ pub fn all(width: u32, data: Option<&Path>) -> anyhow::Result<(Vec<Subjects>, Ve
     ] {
         match data.map(|folder| folder.join(file)).filter(|path| path.exists()) {
             Some(path) => scenes.push(real(name, about, &path, width)?),
-            None => left_out.push(format!("The scene “{name}” is left out: no {file} in a folder given by --data or SPLAT_TEST_DATA.")),
+            None => left_out.push(format!(
+                "The scene “{name}” is left out: no {file} in a folder given by --data or SPLAT_TEST_DATA."
+            )),
         }
     }
     scenes.push(horizon(width));
@@ -69,7 +71,8 @@ fn sphere_scene(width: u32) -> anyhow::Result<Subjects> {
     cloud.colors = Some(checks(&cloud));
     let Scene { camera, options } =
         Case { subject, samples: 16, blur: Blur::Pinhole }.scene(&cloud).context("a scene")?;
-    let options = RenderOptions { filter: PixelFilter::BlackmanHarris, shading: Shading::Headlight, ..options };
+    let options =
+        RenderOptions { filter: PixelFilter::BlackmanHarris, shading: Shading::Headlight, ..options };
     Ok(Subjects {
         name: "sphere",
         about: "6,250 discs on a sphere in checks, Gaussian kernel, cutoff 2, front faces",
@@ -221,7 +224,13 @@ pub fn smooth(width: u32) -> Subjects {
     cloud.areas = Some(areas);
     // Opaque wherever the weight is at least a half, which it is everywhere: the rims of F = 9 hardly show.
     let options = RenderOptions { cutoff: 9.0, ..defaults(Shading::Color) };
-    Subjects { name: "smooth", about: "a wall of blended colours", cloud, camera: small_camera(width), options }
+    Subjects {
+        name: "smooth",
+        about: "a wall of blended colours",
+        cloud,
+        camera: small_camera(width),
+        options,
+    }
 }
 
 /// Hard discs over one another: every difference is an edge.

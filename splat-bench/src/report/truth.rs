@@ -138,7 +138,8 @@ impl<'a> Exact<'a> {
 
     /// The splats that may be hit from within a rectangle of the picture, in pixels.
     fn candidates(&self, [low, high]: [[f64; 2]; 2]) -> Vec<u32> {
-        let meets = |splat: &Splat| (0..2).all(|i| splat.bounds[i][0] <= high[i] && low[i] <= splat.bounds[i][1]);
+        let meets =
+            |splat: &Splat| (0..2).all(|i| splat.bounds[i][0] <= high[i] && low[i] <= splat.bounds[i][1]);
         (0..self.splats.len() as u32).filter(|&i| meets(&self.splats[i as usize])).collect()
     }
 
@@ -375,9 +376,8 @@ impl<'a> Exact<'a> {
                         .collect();
                     let corner = [x, y].map(|low| f64::from(low) - reach);
                     candidates.clear();
-                    let may_be_hit = |&i: &u32| {
-                        self.may_be_hit(&self.splats[i as usize], corner, 1.0 + 2.0 * reach)
-                    };
+                    let may_be_hit =
+                        |&i: &u32| self.may_be_hit(&self.splats[i as usize], corner, 1.0 + 2.0 * reach);
                     candidates.extend(of_tile.iter().copied().filter(may_be_hit));
                     let mut sum = [0.0; 4];
                     self.samples([x, y], &samples, &candidates, &mut fragments, |_, color| {
@@ -407,14 +407,16 @@ impl Splat {
         }
         let constants = project(&splat, view)?;
         // A sphere around the disc, and the box around that.
-        let sphere = view.radius * t1.length().hypot(t2.length()).min(
-            // Perpendicular axes: the longer one is enough.
-            if t1.dot(t2).abs() < 1e-9 * t1.length() * t2.length() {
-                t1.length().max(t2.length())
-            } else {
-                f64::INFINITY
-            },
-        ) * (1.0 + 1e-9);
+        let sphere = view.radius
+            * t1.length().hypot(t2.length()).min(
+                // Perpendicular axes: the longer one is enough.
+                if t1.dot(t2).abs() < 1e-9 * t1.length() * t2.length() {
+                    t1.length().max(t2.length())
+                } else {
+                    f64::INFINITY
+                },
+            )
+            * (1.0 + 1e-9);
         let depths = [(splat.center.z - extent).max(view.near), splat.center.z + extent];
         let image = [0, 1].map(|axis| image(splat.center, sphere, depths, view, axis));
         let bounds = [0, 1].map(|axis| {
@@ -426,9 +428,8 @@ impl Splat {
         // A hit at depth w that a pinhole would see at d' has m = d' + p (1/wr - 1/w).
         let reference = constants.pixel().to_array();
         let sharp = [0, 1].map(|axis| {
-            let spread = |lens: Lens| {
-                lens.radius * farthest(1.0 / constants.depth, depths) * view.pixel_scale[axis]
-            };
+            let spread =
+                |lens: Lens| lens.radius * farthest(1.0 / constants.depth, depths) * view.pixel_scale[axis];
             let spread = view.lens.map_or(0.0, spread) + 1e-6;
             [image[axis][0] - reference[axis] - spread, image[axis][1] - reference[axis] + spread]
         });
@@ -597,19 +598,15 @@ fn densities(x: f64) -> [[f64; 4]; 3] {
     let phase = TAU / 3.0;
     let (sine, cosine) = (phase * x).sin_cos();
     let (sine_third, cosine_third) = (0.75f64.sqrt(), -0.5);
-    let cosines = [
-        cosine * cosine_third - sine * sine_third,
-        cosine,
-        cosine * cosine_third + sine * sine_third,
-    ];
+    let cosines =
+        [cosine * cosine_third - sine * sine_third, cosine, cosine * cosine_third + sine * sine_third];
     // With t = x/3 + 1/2 the printed a0 - a1 cos 2 pi t + .. has all signs positive about the centre.
     let window = cosines.map(|c| {
         0.35875 + 0.48829 * c + 0.14128 * (2.0 * c * c - 1.0) + 0.01168 * (4.0 * c * c * c - 3.0 * c)
     });
     let offsets = [x + 1.0, x, x - 1.0];
-    [0, 1, 2].map(|i| {
-        [f64::from(u8::from(i == 1)), (1.0 - offsets[i].abs()).max(0.0), gaussian[i], window[i]]
-    })
+    [0, 1, 2]
+        .map(|i| [f64::from(u8::from(i == 1)), (1.0 - offsets[i].abs()).max(0.0), gaussian[i], window[i]])
 }
 
 /// Random numbers that have nothing to do with the renderer's: SplitMix64 (Steele et al. 2014).

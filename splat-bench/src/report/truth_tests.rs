@@ -57,10 +57,12 @@ fn densities_are_those_of_the_filters() {
 
 #[test]
 fn the_renderer_agrees_within_the_error_of_its_samples() {
-    let scenes = golden().into_iter().filter(|scene| matches!(scene.name, "discs" | "tilted" | "transparency"));
+    let scenes =
+        golden().into_iter().filter(|scene| matches!(scene.name, "discs" | "tilted" | "transparency"));
     for mut scene in scenes {
         scene.options.background = None;
-        let options = RenderOptions { samples: 1024, table: splat_core::TableMode::Quartic8, ..scene.options };
+        let options =
+            RenderOptions { samples: 1024, table: splat_core::TableMode::Quartic8, ..scene.options };
         let rendered = splat_core::render(&scene.cloud, &scene.camera, &options, &mut |_| {}).unwrap();
         let picture: Picture = rendered.film.rgba.iter().map(|rgba| rgba.map(f64::from)).collect();
         let exact = Exact::new(&scene.cloud, &scene.camera, &options);

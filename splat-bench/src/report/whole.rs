@@ -120,9 +120,8 @@ pub fn picture_of(film: &Film) -> Picture {
 pub fn truth_of(scene: &Subjects, context: &Context) -> anyhow::Result<(Truth, f64)> {
     // Two halves of at least 512 samples each, whose difference tells the error of their mean.
     let side = context.truth_side;
-    let [a, b] = [0x5EED, 0xF00D].map(|seed| {
-        cached(&context.cache, &scene.cloud, &scene.camera, &scene.options, side, seed)
-    });
+    let [a, b] = [0x5EED, 0xF00D]
+        .map(|seed| cached(&context.cache, &scene.cloud, &scene.camera, &scene.options, side, seed));
     let (a, b) = (a?, b?);
     let filter = scene.options.filter;
     let noise = 0.5 * distance(a.of(filter), b.of(filter)).rmse;
@@ -232,10 +231,8 @@ fn measure(scene: &Subjects, truth: &Truth, context: &Context) -> anyhow::Result
         let same_samples = RenderOptions { table: TableMode::Poly8, ..setting.options.clone() };
         let known = exact.iter().position(|(options, _)| *options == same_samples);
         let known = known.unwrap_or_else(|| {
-            let table =
-                SampleTable::new(&setting.options, scene.camera.lens(), scene.camera.pixel_scale());
-            let picture =
-                Exact::new(&scene.cloud, &scene.camera, &setting.options).with_samples_of(&table);
+            let table = SampleTable::new(&setting.options, scene.camera.lens(), scene.camera.pixel_scale());
+            let picture = Exact::new(&scene.cloud, &scene.camera, &setting.options).with_samples_of(&table);
             exact.push((same_samples, picture));
             exact.len() - 1
         });
@@ -314,9 +311,8 @@ fn choice(axis: &str, scenes: &[Vec<Measured>], slopes: &[f64]) -> String {
         (0..scene.len()).filter(|&i| scene[i].setting.axis == axis).collect()
     };
     let mean = |value: &dyn Fn(&[Measured], f64, usize) -> f64, place: usize| {
-        let logs = scenes.iter().zip(slopes).map(|(scene, &slope)| {
-            value(scene, slope, of_axis(scene)[place]).ln()
-        });
+        let logs =
+            scenes.iter().zip(slopes).map(|(scene, &slope)| value(scene, slope, of_axis(scene)[place]).ln());
         (logs.sum::<f64>() / scenes.len() as f64).exp()
     };
     let time = |scene: &[Measured], _: f64, i: usize| scene[i].times.least();
@@ -364,7 +360,11 @@ fn choice(axis: &str, scenes: &[Vec<Measured>], slopes: &[f64]) -> String {
                     format!("{} {ratio:.2} times", name(place))
                 })
                 .collect();
-            let against = if axis == "filter" { ", each against its own truth (a narrower filter is noisier or sharper, not wrong)" } else { "" };
+            let against = if axis == "filter" {
+                ", each against its own truth (a narrower filter is noisier or sharper, not wrong)"
+            } else {
+                ""
+            };
             format!(
                 "{axis}: {} reaches a given error soonest; to the same error take: {}{against}.",
                 name(best),
@@ -391,7 +391,12 @@ fn choice(axis: &str, scenes: &[Vec<Measured>], slopes: &[f64]) -> String {
             let list: Vec<String> = places
                 .clone()
                 .map(|place| {
-                    format!("{} {} ms, {}", name(place), number(mean(&time, place)), number(mean(&arithmetic, place)))
+                    format!(
+                        "{} {} ms, {}",
+                        name(place),
+                        number(mean(&time, place)),
+                        number(mean(&arithmetic, place))
+                    )
                 })
                 .collect();
             let chosen = match fastest {
@@ -409,9 +414,19 @@ fn choice(axis: &str, scenes: &[Vec<Measured>], slopes: &[f64]) -> String {
             let rest: Vec<String> = places
                 .clone()
                 .filter(|&place| place != best)
-                .map(|place| format!("{} takes {:.2} times as long", name(place), mean(&time, place) / mean(&time, best)))
+                .map(|place| {
+                    format!(
+                        "{} takes {:.2} times as long",
+                        name(place),
+                        mean(&time, place) / mean(&time, best)
+                    )
+                })
                 .collect();
-            let error = if same { "All have the same error, to the last bit." } else { "Their errors differ, which they must not." };
+            let error = if same {
+                "All have the same error, to the last bit."
+            } else {
+                "Their errors differ, which they must not."
+            };
             format!("core: {} is the fastest; {}. {error}", name(best), rest.join(", "))
         }
     }
