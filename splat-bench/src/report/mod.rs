@@ -104,7 +104,7 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     let quick = choices.quick;
     let mut context = Context {
         quick,
-        repetitions: if quick { 2 } else { 5 },
+        repetitions: if quick { 2 } else { 4 },
         width: if quick { 160 } else { 480 },
         truth_side: 23,
         cache: choices.cache.clone(),

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 /// To be raised with every change of what is computed here, so that no older picture is taken from the cache.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Side of the square of pixels that a task renders.
 const TILE: i32 = 16;
@@ -309,11 +309,11 @@ impl<'a> Exact<'a> {
                 candidates.clear();
                 let may_be_hit = |&i: &u32| self.may_be_hit(&self.splats[i as usize], corner, 1.0);
                 candidates.extend(of_tile.iter().copied().filter(may_be_hit));
-                let mut around = [[[0.0; 5]; 4]; 9];
+                let mut around: Around = [[0.0; WEIGHTS]; 4];
                 self.samples([x, y], &samples, &candidates, &mut fragments, |number, color| {
                     add_sample(&mut around, &pattern.weights[number], color);
                 });
-                sums.add_around([x, y], &around);
+                sums.add_around([x, y], &around, &pattern.total);
             }
         }
         sums
@@ -520,12 +520,16 @@ impl Sums {
         ((y - self.first[1]) * self.size[0] + x - self.first[0]) as usize
     }
 
-    /// Adds the sums that a square's samples make for the pixels around it.
-    fn add_around(&mut self, [x, y]: [i32; 2], around: &Around) {
-        for (i, sums) in around.iter().enumerate() {
-            let index = self.index([x + i as i32 % 3 - 1, y + i as i32 / 3 - 1]);
-            for (sum, value) in self.all[index].as_flattened_mut().iter_mut().zip(sums.as_flattened()) {
-                *sum += value;
+    /// Adds the sums that a square's samples make for the pixels around it, and their weights.
+    fn add_around(&mut self, [x, y]: [i32; 2], around: &Around, total: &[f64; WEIGHTS]) {
+        for (i, offset) in (0..9).map(|i| (i as usize, [i % 3 - 1, i / 3 - 1])) {
+            let index = self.index([x + offset[0], y + offset[1]]);
+            for (filter, sums) in self.all[index].iter_mut().enumerate() {
+                let Some(weight) = weight_index(i, filter) else { continue };
+                let values = [around[0], around[1], around[2], around[3], *total].map(|sums| sums[weight]);
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value;
+                }
             }
         }
     }
@@ -551,18 +555,30 @@ impl Sums {
     }
 }
 
-/// The sums for the three by three pixels around a square.
-type Around = [[[f64; 5]; 4]; 9];
+/// Number of weights that a sample has: for each of the three by three pixels around its square those of the tent, the
+/// Gaussian and the window, and the box's for its own.
+const WEIGHTS: usize = 28;
 
-/// Adds a sample, given the densities of the filters along x and along y.
-fn add_sample(around: &mut Around, [along_x, along_y]: &[[[f64; 4]; 3]; 2], color: [f64; 4]) {
-    let values = [color[0], color[1], color[2], color[3], 1.0];
-    for (i, sums) in around.iter_mut().enumerate() {
-        for (filter, sums) in sums.iter_mut().enumerate() {
-            let weight = along_x[i % 3][filter] * along_y[i / 3][filter];
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += weight * value;
-            }
+/// Which of them counts for the pixel `i` of the three by three and a filter; `None` if that is 0.
+fn weight_index(i: usize, filter: usize) -> Option<usize> {
+    match filter {
+        0 => (i == 4).then_some(WEIGHTS - 1),
+        _ => Some(9 * (filter - 1) + i),
+    }
+}
+
+/// For each channel, the sums of a square's samples times each of their weights.
+type Around = [[f64; WEIGHTS]; 4];
+
+/// Adds a sample.
+#[inline(always)]
+fn add_sample(around: &mut Around, weights: &[f64; WEIGHTS], color: [f64; 4]) {
+    if color[3] == 0.0 {
+        return;
+    }
+    for (sums, value) in around.iter_mut().zip(color) {
+        for (sum, weight) in sums.iter_mut().zip(weights) {
+            *sum += weight * value;
         }
     }
 }
@@ -571,8 +587,9 @@ fn add_sample(around: &mut Around, [along_x, along_y]: &[[[f64; 4]; 3]; 2], colo
 struct Pattern {
     side: u32,
     jitter: Vec<[f64; 2]>,
-    /// For each sample, along x and along y, the [`densities`].
-    weights: Vec<[[[f64; 4]; 3]; 2]>,
+    weights: Vec<[f64; WEIGHTS]>,
+    /// Their sum.
+    total: [f64; WEIGHTS],
 }
 
 /// How many there are.
@@ -582,9 +599,24 @@ impl Pattern {
     fn new(side: u32, seed: u64) -> Self {
         let mut random = SplitMix(seed);
         let jitter: Vec<[f64; 2]> = (0..side * side).map(|i| random.in_cell(i, side)).collect();
-        let weights = jitter.iter().map(|jitter| jitter.map(|jitter| densities(jitter - 0.5))).collect();
-        Self { side, jitter, weights }
+        let weights: Vec<[f64; WEIGHTS]> = jitter.iter().map(|&jitter| weights(jitter)).collect();
+        let total = std::array::from_fn(|i| weights.iter().map(|weights| weights[i]).sum());
+        Self { side, jitter, weights, total }
     }
+}
+
+/// The weights of a sample: the filters' densities along x times those along y.
+fn weights(jitter: [f64; 2]) -> [f64; WEIGHTS] {
+    let [along_x, along_y] = jitter.map(|jitter| densities(jitter - 0.5));
+    let mut weights = [0.0; WEIGHTS];
+    for i in 0..9 {
+        for filter in 0..4 {
+            if let Some(index) = weight_index(i, filter) {
+                weights[index] = along_x[i % 3][filter] * along_y[i / 3][filter];
+            }
+        }
+    }
+    weights
 }
 
 /// The densities of all filters at a sample `x` from the centre of its own square (at most 1/2), as seen from the centres of

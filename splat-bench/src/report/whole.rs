@@ -9,6 +9,7 @@ use super::plot::{Plot, Series, number};
 use super::scenes::Subjects;
 use super::timing::Times;
 use super::truth::{Exact, Truth, cached};
+use rayon::prelude::*;
 use splat_core::sampling::SampleTable;
 use splat_core::{Film, PatternKind, PixelFilter, RenderOptions, TableMode};
 use splat_simd::{Level, Renderer};
@@ -226,28 +227,46 @@ fn measure(scene: &Subjects, truth: &Truth, context: &Context) -> anyhow::Result
     let size = [scene.camera.width, scene.camera.height];
     // The exact picture of the samples changes with the samples only.
     let mut exact: Vec<(RenderOptions, Picture)> = Vec::new();
-    let mut measured = Vec::new();
-    for ((setting, times), picture) in settings.into_iter().zip(times).zip(pictures) {
+    let mut of_setting = Vec::new();
+    for setting in &settings {
         let same_samples = RenderOptions { table: TableMode::Poly8, ..setting.options.clone() };
         let known = exact.iter().position(|(options, _)| *options == same_samples);
-        let known = known.unwrap_or_else(|| {
-            let table = SampleTable::new(&setting.options, scene.camera.lens(), scene.camera.pixel_scale());
-            let picture = Exact::new(&scene.cloud, &scene.camera, &setting.options).with_samples_of(&table);
+        of_setting.push(known.unwrap_or_else(|| {
+            let Subjects { cloud, camera, .. } = scene;
+            let table = SampleTable::new(&setting.options, camera.lens(), camera.pixel_scale());
+            let picture = Exact::new(cloud, camera, &setting.options).with_samples_of(&table);
             exact.push((same_samples, picture));
             exact.len() - 1
-        });
-        let true_picture = truth.of(setting.options.filter);
-        let error = distance(true_picture, &picture);
-        measured.push(Measured {
+        }));
+    }
+    // FLIP takes longer than most pictures: not twice for the same one, and several at once.
+    let first_alike: Vec<usize> = (0..settings.len())
+        .map(|i| {
+            let alike = |j: &usize| {
+                settings[*j].options.filter == settings[i].options.filter && pictures[*j] == pictures[i]
+            };
+            (0..i).find(alike).unwrap_or(i)
+        })
+        .collect();
+    let judge = |i: usize| {
+        let true_picture = truth.of(settings[i].options.filter);
+        let flip = (first_alike[i] == i).then(|| mean_flip(true_picture, &pictures[i], size));
+        let arithmetic = distance(&exact[of_setting[i]].1, &pictures[i]).rmse;
+        (distance(true_picture, &pictures[i]), flip, arithmetic)
+    };
+    let judged: Vec<_> = (0..settings.len()).into_par_iter().map(judge).collect();
+    let flips: Vec<f64> = first_alike.iter().map(|&i| judged[i].1.unwrap_or(f64::NAN)).collect();
+    let all = settings.into_iter().zip(times).zip(judged).zip(flips);
+    Ok(all
+        .map(|(((setting, times), (error, _, arithmetic)), flip)| Measured {
             rmse: error.rmse,
             max: error.max,
-            flip: mean_flip(true_picture, &picture, size),
-            arithmetic: distance(&exact[known].1, &picture).rmse,
+            flip,
+            arithmetic,
             setting,
             times,
-        });
-    }
-    Ok(measured)
+        })
+        .collect())
 }
 
 /// Whether no other setting of the same filter is both faster and more accurate.
