@@ -559,3 +559,44 @@ fn denormal() -> Cloud {
     }
     cloud
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors of the listing and of the reference for some splats of a case.
+    fn errors(case: &Case) -> [Errors; 2] {
+        let (camera, options) = (case.camera(), options());
+        let table = SampleTable::new(&options, camera.lens(), camera.pixel_scale());
+        let mut random = Random::new(3);
+        let mut errors = [Errors::default(); 2];
+        for _ in 0..4 {
+            let (center, axes) = case.splat(&mut random);
+            let cloud = Cloud { origin: camera.eye(), oriented: false, ..ellipses(&[(center, axes)]) };
+            let exact = truth(&cloud, &camera, &table);
+            let mut found = nothing();
+            let sink = &mut |place, _, fragment| keep(&mut found, place, fragment);
+            splat_core::fragments(&cloud, &camera, &options, sink).unwrap();
+            errors[0].add(&exact, &listing(case, (center, axes), &camera, &table));
+            errors[1].add(&exact, &found);
+        }
+        errors
+    }
+
+    #[test]
+    fn an_ordinary_splat_is_no_trouble_for_anyone() {
+        for lens in [None, Some([2.8, 0.7])] {
+            for errors in errors(&Case { lens, ..Case::new("ordinary", 4.0, 30.0) }) {
+                assert!(errors.hits > 500 && errors.share() < 0.01, "{} of {}", errors.wrong, errors.hits);
+                assert!(errors.weight < 1e-4 && errors.depth < 1e-4, "{} {}", errors.weight, errors.depth);
+            }
+        }
+    }
+
+    #[test]
+    fn far_from_zero_the_listing_fails_and_the_reference_does_not() {
+        let far = Case { offset: 1e8, ..Case::new("far", 4.0, 30.0) };
+        let [listing, reference] = errors(&far);
+        assert!(listing.share() > 0.1 && reference.share() < 0.01);
+    }
+}
