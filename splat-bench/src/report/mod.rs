@@ -105,7 +105,7 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     let mut context = Context {
         quick,
         repetitions: if quick { 2 } else { 4 },
-        width: if quick { 160 } else { 480 },
+        width: if quick { 128 } else { 480 },
         truth_side: 23,
         cache: choices.cache.clone(),
         figures: Figures::default(),
@@ -123,7 +123,12 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
     let run = baseline::Run {
         machine: machine.clone(),
-        parameters: format!("{} scenes: {}", if quick { "quick;" } else { "full;" }, names.join(" ")),
+        parameters: format!(
+            "{} width {}, scenes: {}",
+            if quick { "quick," } else { "full," },
+            context.width,
+            names.join(" ")
+        ),
         figures: context.figures.clone(),
     };
     let seconds = context.start.elapsed().as_secs_f64();
