@@ -21,7 +21,12 @@ pub fn any_f32() -> impl Strategy<Value = f32> + Clone {
         1e-45,
         f32::EPSILON,
     ];
-    prop_oneof![any::<u32>().prop_map(f32::from_bits), select(remarkable.to_vec()), -3.0..3.0f32]
+    prop_oneof![
+        any::<u32>().prop_map(f32::from_bits),
+        select(remarkable.to_vec()),
+        -3.0..3.0f32,
+        -0.5..0.5f32
+    ]
 }
 
 /// Any pattern of bits of an `f32`, as `f64`.

@@ -12,35 +12,12 @@ use splat_core::{
     AovSelection, Camera, Cloud, Film, Kernel, Lens, PatternKind, PixelFilter, Projection, RenderOptions,
     Shading, Shapes, TableMode, render,
 };
+use splat_tests::textures::any_f32;
 
 const WIDTH: u32 = 9;
 const HEIGHT: u32 = 7;
 /// Splats of a cloud.
 const N: usize = 8;
-
-/// Any pattern of bits, the remarkable ones and ordinary numbers often.
-fn any_f32() -> impl Strategy<Value = f32> {
-    let remarkable = [
-        0.0,
-        -0.0,
-        1.0,
-        -1.0,
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN,
-        f32::MIN_POSITIVE,
-        1e-45,
-        f32::EPSILON,
-    ];
-    prop_oneof![
-        any::<u32>().prop_map(f32::from_bits),
-        select(remarkable.to_vec()),
-        -3.0..3.0f32,
-        -0.5..0.5f32
-    ]
-}
 
 /// Finite numbers of any size.
 fn finite_f32() -> impl Strategy<Value = f32> {
