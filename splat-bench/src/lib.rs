@@ -45,6 +45,7 @@ pub fn sphere_camera() -> Camera {
         near: 0.01,
         far: f64::INFINITY,
         clip_planes: Vec::new(),
+        distortion: None,
     }
 }
 

@@ -307,6 +307,7 @@ mod tests {
             near: 0.1,
             far: f64::INFINITY,
             clip_planes: Vec::new(),
+            distortion: None,
         };
         let lens_of = |line: &str, lens| {
             let arguments = arguments(&format!("--camera c.json {line}"));

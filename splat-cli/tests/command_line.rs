@@ -72,6 +72,7 @@ fn camera(centre: DVec3) -> Camera {
         near: 0.01,
         far: f64::INFINITY,
         clip_planes: Vec::new(),
+        distortion: None,
     }
 }
 

@@ -25,6 +25,20 @@ pub struct Camera {
     pub far: f64,
     /// Clip planes (a, b, c, d) in world space: a splat wholly in a x + b y + c z + d < 0 is not drawn.
     pub clip_planes: Vec<DVec4>,
+    /// How the lens of a real camera bends the picture; `None` is an ideal one. Perspective only.
+    pub distortion: Option<Distortion>,
+}
+
+/// Lens distortion after Brown and Conrady, in the form and with the names of OpenCV and COLMAP.
+///
+/// An ideal point (x, y) in tan units (x/w, y/w) with r2 = x^2 + y^2 is seen at
+/// x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2), and for y likewise with p1 and p2 exchanged.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Distortion {
+    /// k1, k2, k3.
+    pub radial: [f64; 3],
+    /// p1, p2.
+    pub tangential: [f64; 2],
 }
 
 /// How camera space becomes pixels.
@@ -155,6 +169,9 @@ impl Camera {
         if !self.eye().is_finite() {
             let expected = "a matrix whose upper left 3x3 part can be inverted";
             return Err(Error::invalid("camera world_to_camera", self.world_to_camera, expected));
+        }
+        if self.distortion.is_some() {
+            return Err(Error::invalid("camera distortion", "one", "none yet"));
         }
         if self.clip_planes.iter().any(|plane| !plane.is_finite()) {
             return Err(Error::invalid("clip plane", "a value that is not finite", "finite numbers"));

@@ -98,6 +98,7 @@ pub fn fit(cloud: &Cloud, framing: &Framing, options: &RenderOptions) -> Result<
         near: NEAR * diagonal,
         far: f64::INFINITY,
         clip_planes: Vec::new(),
+        distortion: None,
     })
 }
 
@@ -143,6 +144,7 @@ impl Support {
             near: 0.0,
             far: f64::INFINITY,
             clip_planes: Vec::new(),
+            distortion: None,
         };
         let view = View::new(&camera, options);
         let radius = options.cutoff.sqrt();

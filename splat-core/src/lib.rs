@@ -21,7 +21,7 @@ pub mod shade;
 pub mod srgb;
 pub mod texture;
 
-pub use camera::{Camera, Lens, Projection};
+pub use camera::{Camera, Distortion, Lens, Projection};
 pub use cloud::{Cloud, Defect, Shapes, TextureCoordinates};
 pub use error::Error;
 pub use film::{AovSelection, Film, PixelRect};

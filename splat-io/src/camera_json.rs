@@ -115,6 +115,7 @@ pub fn parse_camera_json(text: &str, path: &Path, default_near: f64) -> Result<C
         near: default_near,
         far: json.far.unwrap_or(f64::INFINITY),
         clip_planes: Vec::new(),
+        distortion: None,
     };
     // Lengths given in scene units become those of the camera.
     let scale = camera.scale();

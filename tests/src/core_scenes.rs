@@ -21,6 +21,7 @@ pub fn pinhole(width: u32, height: u32, focal: f64) -> Camera {
         near: 1e-4,
         far: f64::INFINITY,
         clip_planes: vec![],
+        distortion: None,
     }
 }
 

@@ -111,6 +111,7 @@ pub fn pinhole(width: u32, height: u32, focal: f64) -> Camera {
         near: 0.01,
         far: f64::INFINITY,
         clip_planes: vec![],
+        distortion: None,
     }
 }
 

@@ -31,6 +31,7 @@ fn camera(projection: Projection, rng: &mut Random) -> Camera {
         near: 1e-3,
         far: f64::INFINITY,
         clip_planes: vec![],
+        distortion: None,
     }
 }
 

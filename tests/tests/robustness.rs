@@ -104,6 +104,7 @@ fn camera() -> impl Strategy<Value = Camera> {
             near,
             far: far.map_or(f64::INFINITY, |far| near + far),
             clip_planes,
+            distortion: None,
         })
         .prop_filter("a valid camera", |camera| camera.check().is_ok())
 }
@@ -187,6 +188,7 @@ fn ordinary_camera() -> Camera {
         near: 1e-3,
         far: f64::INFINITY,
         clip_planes: vec![],
+        distortion: None,
     }
 }
 

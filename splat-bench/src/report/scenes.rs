@@ -191,6 +191,7 @@ fn horizon(width: u32) -> Subjects {
         near: 0.05,
         far: f64::INFINITY,
         clip_planes: Vec::new(),
+        distortion: None,
     };
     Subjects {
         name: "horizon",

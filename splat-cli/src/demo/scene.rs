@@ -57,6 +57,7 @@ pub fn camera([width, height]: [u32; 2]) -> Camera {
         near: 0.01,
         far: f64::INFINITY,
         clip_planes: Vec::new(),
+        distortion: None,
     }
 }
 
