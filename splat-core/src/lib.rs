@@ -11,6 +11,7 @@ pub mod fit;
 pub mod kernel;
 pub mod options;
 pub mod pixel;
+pub mod placement;
 pub mod prepare;
 pub mod raster;
 pub mod real;

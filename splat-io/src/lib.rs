@@ -16,6 +16,7 @@ pub mod metadata;
 pub mod picture;
 pub mod ply;
 pub mod png_file;
+pub mod scene_file;
 mod source;
 pub mod srgb;
 pub mod texture_file;
@@ -32,4 +33,5 @@ pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::write_png;
+pub use scene_file::{SceneFile, parse_scene, read_scene};
 pub use texture_file::{read_pyramid, read_pyramid_from};
