@@ -6,6 +6,7 @@ use crate::choices::{
     TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
+use crate::scene::Scene;
 use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
 use splat_core::{AovSelection, PixelRect};
@@ -100,23 +101,29 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one
+    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one; a scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Print a scene file that means this command line instead of rendering it
+    #[arg(long, help_heading = "Program")]
+    pub print_config: bool,
+    /// The scene file among the inputs, once it is read.
+    #[arg(skip)]
+    pub scene: Option<Scene>,
     /// From where.
     #[command(flatten, next_help_heading = "Camera")]
     pub camera: CameraArguments,
     /// What part of the picture, and how it is sampled.
-    #[command(flatten, next_help_heading = "Samples")]
+    #[command(flatten, next_help_heading = "Film")]
     pub samples: SampleArguments,
     /// What the splats look like.
     #[command(flatten, next_help_heading = "Splats")]
     pub splats: SplatArguments,
     /// Textures and surroundings.
-    #[command(flatten, next_help_heading = "Material")]
+    #[command(flatten, next_help_heading = "Texture")]
     pub material: MaterialArguments,
     /// What is written.
     #[command(flatten, next_help_heading = "Output")]
@@ -142,19 +149,19 @@ pub struct CameraArguments {
     #[arg(long, conflicts_with_all = ["fstop", "lens_radius", "focus", "blades"])]
     pub ortho: bool,
     /// Width and height of the picture, in pixels [default: 1280x960]
-    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", value_parser = values::size, help_heading = "Film")]
     pub size: Option<[u32; 2]>,
     /// f-number of a thin lens whose image plane is at distance 1, in camera units
-    #[arg(long, value_name = "N", value_parser = values::positive)]
+    #[arg(long, value_name = "N", value_parser = values::positive, help_heading = "Lens")]
     pub fstop: Option<f64>,
     /// Radius of a thin lens, in scene units; overrides --fstop
-    #[arg(long, value_name = "R", value_parser = values::positive)]
+    #[arg(long, value_name = "R", value_parser = values::positive, help_heading = "Lens")]
     pub lens_radius: Option<f64>,
     /// Depth in focus, in camera units, or inf [default: that of the cloud's centre]
-    #[arg(long, value_name = "DEPTH", value_parser = values::focus)]
+    #[arg(long, value_name = "DEPTH", value_parser = values::focus, help_heading = "Lens")]
     pub focus: Option<f64>,
     /// Straight blades of the aperture; 0 is round
-    #[arg(long, value_name = "N", value_parser = values::blades)]
+    #[arg(long, value_name = "N", value_parser = values::blades, help_heading = "Lens")]
     pub blades: Option<u32>,
     /// Nothing nearer than this depth is drawn, in camera units [default: 1e-4 of the cloud's diagonal]
     #[arg(long, value_name = "DEPTH", value_parser = values::positive)]
@@ -218,14 +225,15 @@ pub struct SplatArguments {
     #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
     pub radius_scale: f64,
     /// How light falls on splats
-    #[arg(long, value_name = "SHADING", default_value = "auto")]
+    #[arg(long, value_name = "SHADING", default_value = "auto", help_heading = "Light")]
     pub shading: ShadingChoice,
     /// Where --shading lambert has its light: AZIMUTH,ELEVATION in degrees, as in --view [default: 45,45]
     #[arg(long, value_name = "DIRECTION", value_parser = values::view, allow_hyphen_values = true)]
+    #[arg(help_heading = "Light")]
     pub light: Option<ViewDirection>,
     /// Linear R,G,B or R,G,B,A behind everything, or none
     #[arg(long, value_name = "COLOR", value_parser = values::background, default_value = "none")]
-    #[arg(allow_hyphen_values = true)]
+    #[arg(allow_hyphen_values = true, help_heading = "Film")]
     pub background: Background,
 }
 
@@ -254,13 +262,13 @@ pub struct MaterialArguments {
     #[arg(long, value_name = "DETAIL", default_value = "fragment")]
     pub texture_detail: DetailChoice,
     /// An image (.png, .exr) of all directions by longitude and latitude, up above, to be seen in the surface
-    #[arg(long, value_name = "IMAGE")]
+    #[arg(long, value_name = "IMAGE", help_heading = "Light")]
     pub environment: Option<PathBuf>,
     /// See the surroundings as in a mirror; the default
-    #[arg(long, conflicts_with = "refract")]
+    #[arg(long, conflicts_with = "refract", help_heading = "Light")]
     pub reflect: bool,
     /// See the surroundings through the surface, whose index of refraction this is (glass: 1.5)
-    #[arg(long, value_name = "IOR", value_parser = values::positive)]
+    #[arg(long, value_name = "IOR", value_parser = values::positive, help_heading = "Light")]
     pub refract: Option<f64>,
 }
 

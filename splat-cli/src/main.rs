@@ -19,12 +19,12 @@ mod output;
 mod progress;
 mod render;
 mod resolve;
+mod scene;
 mod statistics;
 mod usage;
 mod values;
 
-use arguments::{Arguments, Command};
-use clap::Parser;
+use arguments::Command;
 use std::process::ExitCode;
 use usage::UsageError;
 
@@ -35,16 +35,22 @@ const FAILURE: u8 = 1;
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
-        Command::Render(arguments) => render::run(&arguments),
-        Command::Convert(arguments) => convert::run(&arguments),
-        Command::Info(arguments) => info::run(&arguments),
-        Command::Demo(arguments) => demo::run(&arguments),
-    };
-    let Err(error) = outcome else { return ExitCode::SUCCESS };
+    let Err(error) = run() else { return ExitCode::SUCCESS };
     if console::is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
     }
     console::error(&error);
     ExitCode::from(if error.is::<UsageError>() { USAGE } else { FAILURE })
+}
+
+/// Runs the command of the command line.
+fn run() -> anyhow::Result<()> {
+    let (arguments, matches) = scene::parse(std::env::args_os().collect())?;
+    match arguments.command {
+        Command::Render(arguments) if arguments.print_config => scene::print(&arguments, &matches),
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+    }
 }

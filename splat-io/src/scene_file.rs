@@ -16,6 +16,7 @@
 
 use crate::{Error, Place};
 use glam::{DAffine3, DMat3, DMat4, DVec3};
+use std::fmt;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -74,6 +75,15 @@ pub enum Value {
     Flag(bool),
     /// A text; a number as it is written; the elements of an array, with commas between them.
     Text(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Text(text) => f.write_str(text),
+        }
+    }
 }
 
 /// Reads a scene file.
