@@ -53,7 +53,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     inputs::check_usable(&cloud, &reports)?;
     let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
     let up = resolve::up(&arguments.camera, &cloud);
-    options.material = material::material(&arguments.material, images, &cloud, up)?;
+    options.material = material::material(&arguments.material, images, &cloud, up)?.into();
     options.check()?;
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;

@@ -30,4 +30,4 @@ pub use kernel::{Kernel, TableMode};
 pub use options::{RenderOptions, Shading};
 pub use render::{Rendered, Statistics, fragments, render};
 pub use sampling::{PatternKind, PixelFilter};
-pub use shade::{Detail, Environment, Material, Optics};
+pub use shade::{Detail, Environment, Material, Materials, Optics};

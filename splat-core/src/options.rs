@@ -3,7 +3,7 @@
 use crate::kernel::{Kernel, TableMode};
 use crate::sampling::{PatternKind, PixelFilter};
 use crate::shade::Optics;
-use crate::{AovSelection, Error, Material, PixelRect};
+use crate::{AovSelection, Error, Materials, PixelRect};
 use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use std::ops::Range;
@@ -40,7 +40,7 @@ pub struct RenderOptions {
     /// How light falls on splats.
     pub shading: Shading,
     /// What colours splats besides the cloud.
-    pub material: Material,
+    pub material: Materials,
     /// What is computed besides colour and alpha.
     pub aovs: AovSelection,
     /// Bytes that the fragments of a tile may take; a tile that needs more is split, to a pixel if need be.
@@ -82,7 +82,7 @@ impl Default for RenderOptions {
             cull: false,
             background: None,
             shading: Shading::Color,
-            material: Material::default(),
+            material: Materials::default(),
             aovs: AovSelection::default(),
             tile_memory: 64 << 20,
         }
@@ -131,10 +131,12 @@ impl RenderOptions {
         {
             return Err(Error::invalid("light", to_light, "a finite direction, not zero"));
         }
-        if let Some(Optics::Refract(index)) = self.material.environment.as_ref().map(|all| all.optics())
-            && !(index.is_finite() && index > 0.0)
-        {
-            return Err(Error::invalid("index of refraction", index, "a finite number greater than 0"));
+        for material in self.material.iter() {
+            if let Some(Optics::Refract(index)) = material.environment.as_ref().map(|all| all.optics())
+                && !(index.is_finite() && index > 0.0)
+            {
+                return Err(Error::invalid("index of refraction", index, "a finite number greater than 0"));
+            }
         }
         if let Some(background) = self.background
             && !(background.iter().all(|value| value.is_finite()) && (0.0..=1.0).contains(&background[3]))

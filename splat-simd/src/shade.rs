@@ -5,12 +5,12 @@ use crate::records::RecordBuffer;
 use crate::texture::{LanePyramid, LaneSampler, Lookup};
 use glam::Vec2;
 use splat_core::setup::VisibleSplat;
-use splat_core::shade::{Material, ShadedSplat, Sight, SplatShader};
+use splat_core::shade::{Materials, ShadedSplat, Sight, SplatShader};
 use splat_core::texture::filter::Average;
 use splat_core::texture::{Filter, Footprint, ImageLookup, ImageTexture, Pyramid, ScalarLookup};
 use std::sync::Arc;
 
-/// The images of a material, ready for lanes.
+/// The images of a picture's materials, ready for lanes.
 #[derive(Debug)]
 pub struct LaneImages {
     level: Level,
@@ -23,8 +23,8 @@ impl LaneImages {
         Self { level, images: Vec::new() }
     }
 
-    /// Makes ready the images of a material, those that are not, and forgets all others.
-    pub fn set(&mut self, material: &Material) {
+    /// Makes ready the images of materials, those that are not, and forgets all others.
+    pub fn set(&mut self, material: &Materials) {
         let mut wanted = material.images();
         // The printed filter is not for lanes.
         wanted.retain(|image| image.sampler.filter != Filter::EwaPrinted);
@@ -88,7 +88,7 @@ impl<'a> TileShader<'a> {
     pub fn new(
         shader: SplatShader<'a>,
         splats: &'a [VisibleSplat],
-        material: &'a Material,
+        material: &'a Materials,
         images: &'a LaneImages,
     ) -> Self {
         let image = material.image().and_then(|image| {
@@ -141,8 +141,8 @@ impl<'a> TileShader<'a> {
     /// Notes what the pixel sees of a splat, if it has a colour of its own there.
     fn see(&mut self, number: usize, rank: u32, x: i32, y: i32) {
         let index = self.splats[rank as usize].index as usize;
-        let prepared = self.prepared[number]
-            .get_or_insert_with(|| self.shader.splat(index).filter(|splat| !splat.is_whole()).map(Box::new));
+        let prepared =
+            self.prepared[number].get_or_insert_with(|| self.shader.splat_by_pixel(index).map(Box::new));
         if let Some(splat) = prepared {
             self.sights.push((number, self.shader.sight(splat, x, y)));
         }

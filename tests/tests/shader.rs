@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2};
 use splat_abuffer::Resolve;
-use splat_core::shade::{Detail, Environment, Material, Optics, ShadedPoint};
+use splat_core::shade::{Detail, Environment, Material, Materials, Optics, ShadedPoint};
 use splat_core::texture::{
     FunctionTexture, ImageTexture, Mapping, Placement, Pyramid, Sampler, SolidMapping, SpacePoint, Texels,
     Texture, TextureFunction, Wrap,
@@ -46,7 +46,7 @@ fn plane(center: DVec3, tilt: f64, size: f64, period: f64) -> Cloud {
 }
 
 fn options(material: Material) -> RenderOptions {
-    RenderOptions { samples: 8, material, ..RenderOptions::default() }
+    RenderOptions { samples: 8, material: material.into(), ..RenderOptions::default() }
 }
 
 fn textured(texture: Texture) -> Material {
@@ -408,7 +408,7 @@ fn both_engines_agree() {
                         let mut renderer = Renderer::new(threads, level).unwrap();
                         let options = RenderOptions { tile_memory, ..options.clone() };
                         let fast = renderer.render(&cloud, camera, &options, &mut |_| {}).unwrap();
-                        if options.material.detail == Detail::Splat {
+                        if options.material.of(0).detail == Detail::Splat {
                             assert_same_bits(level.name(), &reference.film, &fast.film);
                         } else {
                             assert_same_but_for_lookups(level.name(), &reference.film, &fast.film);
@@ -453,5 +453,39 @@ fn a_frame_of_axes_is_no_mirror() {
         let seen = turn * (ray - 2.0 * normal.dot(ray) * normal);
         let error = (2.0 * DVec3::from(color) - 1.0 - seen).length();
         assert!(error <= tol::SKY_TEXEL, "{color:?} for {seen} at {pixel}");
+    }
+}
+
+#[test]
+fn each_run_of_splats_has_its_own_material() {
+    let camera = pinhole(64, 64, 100.0);
+    let (center, size) = (DVec3::new(0.0, 0.0, 4.0), 0.16);
+    let cloud = plane(center, 30.0, size, 0.5);
+    let [_, t2] = tilted_axes(center, 30.0, 0.4, 0.3, [size; 2]);
+    let varying = textured(linear(DVec3::new(0.3, 0.2, 0.0), IN_SPACE));
+    let mirror = surroundings(Optics::Reflect);
+    for [a, b] in [[varying.clone(), mirror.clone()], [Material::PLAIN, varying], [mirror, Material::PLAIN]] {
+        // The rows of splats up to the one through the centre are of one material, all others of the other.
+        let rows = Materials::of_runs([(31 * 61, a.clone()), (30 * 61, b.clone())]);
+        let together = RenderOptions { material: rows, ..options(Material::PLAIN) };
+        let whole = picture(&cloud, &camera, &together);
+        let alone = [picture(&cloud, &camera, &options(a)), picture(&cloud, &camera, &options(b))];
+        let mut compared = [0, 0];
+        for (x, y) in pixels(&whole) {
+            let pixel = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
+            let v = (hit(&cloud, &camera, pixel) - center).dot(t2) / t2.length_squared();
+            // A splat reaches two sigma, a pixel and its filter as far again.
+            if (v - 0.5).abs() > 4.0 {
+                let side = usize::from(v > 0.5);
+                let index = whole.index(x, y);
+                assert_eq!(whole.rgba[index], alone[side].rgba[index], "pixel {x}, {y}");
+                compared[side] += 1;
+            }
+        }
+        assert!(compared.iter().all(|&count| count > 500), "{compared:?}");
+        for level in Level::available() {
+            let fast = Renderer::new(1, level).unwrap().render(&cloud, &camera, &together, &mut |_| {});
+            assert_same_but_for_lookups(level.name(), &whole, &fast.unwrap().film);
+        }
     }
 }

@@ -424,7 +424,7 @@ fn surface(
     view: &View,
     options: &RenderOptions,
 ) -> SplatSurface {
-    let color = if options.material.is_plain() {
+    let color = if options.material.of(index).is_plain() {
         let light = light(splat, || shading_normal(cloud, index, view), view, options) as f32;
         let color = splat_color(cloud, index, options.shading);
         finished_color(color.map(|value| value * light), options)

@@ -1,8 +1,10 @@
 //! The splat shader (L161-162): from the cloud's colours, textures and surroundings to the colour of a splat, or of a splat
 //! in a pixel.
 
+mod materials;
 mod splat;
 
+pub use materials::Materials;
 pub use splat::{Shaded, ShadedSplat, Sight, SplatShader};
 
 use crate::texture::{
@@ -55,6 +57,9 @@ pub enum Detail {
 }
 
 impl Material {
+    /// Nothing but the cloud's colours.
+    pub const PLAIN: Self = Self { texture: None, detail: Detail::Fragment, environment: None, shader: None };
+
     /// Whether there is nothing but the cloud's colours.
     pub fn is_plain(&self) -> bool {
         self.texture.is_none() && self.environment.is_none() && self.shader.is_none()

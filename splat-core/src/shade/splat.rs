@@ -92,6 +92,16 @@ impl<'a> SplatShader<'a> {
         Self { cloud, view, options, to_world: view.linear.inverse(), images }
     }
 
+    /// What the splat with this index in the cloud is made of.
+    fn material(&self, index: usize) -> &'a Material {
+        self.options.material.of(index)
+    }
+
+    /// The splat with this index in the cloud, if it has a colour of its own in each pixel; not if it is seen edge-on.
+    pub fn splat_by_pixel(&self, index: usize) -> Option<ShadedSplat> {
+        self.material(index).varies_by_pixel().then(|| self.splat(index))?.filter(|splat| !splat.is_whole)
+    }
+
     /// The splat with this index in the cloud; `None` if it is seen edge-on.
     pub fn splat(&self, index: usize) -> Option<ShadedSplat> {
         let splat = camera_splat(self.cloud, index, self.view);
@@ -139,7 +149,7 @@ impl<'a> SplatShader<'a> {
         let is_small = p * p + q * q + m * m < SMALL * SMALL;
         ShadedSplat {
             index,
-            is_whole: is_small || self.options.material.detail == Detail::Splat,
+            is_whole: is_small || self.material(index).detail == Detail::Splat,
             splat: *splat,
             exact: *exact,
             constants: exact.to_f32(),
@@ -154,7 +164,7 @@ impl<'a> SplatShader<'a> {
     }
 
     fn sight_at(&self, splat: &ShadedSplat, offset: DVec2, pixel: DVec2) -> Sight {
-        let Material { environment, shader, .. } = &self.options.material;
+        let Material { environment, shader, .. } = self.material(splat.index);
         let point = splat.surface_point(offset);
         let ray = (environment.is_some() || shader.is_some()).then(|| RayDifferential {
             ray: self.ray(pixel),
@@ -168,7 +178,7 @@ impl<'a> SplatShader<'a> {
 
     /// The colours of a splat given what is seen of it.
     pub fn shaded(&self, splat: &ShadedSplat, sight: &Sight) -> Shaded {
-        let Material { texture, environment, .. } = &self.options.material;
+        let Material { texture, environment, .. } = self.material(splat.index);
         let albedo = match texture {
             Some(texture) => texture.color(&sight.point, self.images),
             None => splat_color(self.cloud, splat.index, self.options.shading),
@@ -192,7 +202,7 @@ impl<'a> SplatShader<'a> {
 
     /// After the caller's shader, in the resolve's terms.
     fn finished(&self, splat: &ShadedSplat, sight: &Sight, mut color: [f32; 3]) -> [f32; 3] {
-        if let (Some(shader), Some(ray)) = (&self.options.material.shader, sight.ray) {
+        if let (Some(shader), Some(ray)) = (&self.material(splat.index).shader, sight.ray) {
             let (normal, back, index) = (splat.normal, splat.splat.back, splat.index);
             color = shader(&ShadedPoint { surface: sight.point, normal, back, ray, index }, color);
             // No caller's mistake reaches the picture.
@@ -215,11 +225,6 @@ impl<'a> SplatShader<'a> {
 }
 
 impl ShadedSplat {
-    /// Whether it has one colour for all pixels.
-    pub fn is_whole(&self) -> bool {
-        self.is_whole
-    }
-
     /// What a pixel sees of the splat, given the offset of its centre from the splat's.
     ///
     /// The derivative of the homography gives the pixel's footprint in (u, v), a Gaussian. Through a lens it is as much larger
