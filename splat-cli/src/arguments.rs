@@ -2,7 +2,7 @@
 
 use crate::choices::{
     CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice, FilterChoice, KernelChoice,
-    MappingChoice, PatternChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice,
+    MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice,
     TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
@@ -278,6 +278,12 @@ pub struct OutputArguments {
     /// More EXR channels: depth,normal,albedo,position,id,coverage,layers,samples,variance or all
     #[arg(long, value_name = "LIST", value_parser = values::aovs)]
     pub aov: Option<AovSelection>,
+    /// Write each of these channels to an EXR file of its own beside the picture: OUT.depth.exr, OUT.normal.exr, ..
+    #[arg(long, requires = "aov")]
+    pub aov_files: bool,
+    /// Bits of a value in a PNG file
+    #[arg(long, value_name = "BITS", default_value = "8")]
+    pub png_depth: PngDepthChoice,
     /// Floats of an EXR file
     #[arg(long, value_name = "TYPE", default_value = "half")]
     pub exr_type: ExrTypeChoice,

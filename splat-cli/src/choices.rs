@@ -5,6 +5,7 @@ use glam::DVec3;
 use splat_core::fit::Up;
 use splat_core::texture::{Filter, Probes, Quality, Wrap};
 use splat_core::{Detail, Kernel, PatternKind, PixelFilter, Shading, TableMode};
+use splat_io::PngDepth;
 
 /// `--up`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -294,6 +295,26 @@ pub enum ExrTypeChoice {
     Half,
     /// 32 bits
     Float,
+}
+
+/// `--png-depth`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PngDepthChoice {
+    /// 256 levels
+    #[value(name = "8")]
+    Eight,
+    /// 65,536 levels
+    #[value(name = "16")]
+    Sixteen,
+}
+
+impl From<PngDepthChoice> for PngDepth {
+    fn from(choice: PngDepthChoice) -> Self {
+        match choice {
+            PngDepthChoice::Eight => Self::Eight,
+            PngDepthChoice::Sixteen => Self::Sixteen,
+        }
+    }
 }
 
 /// `--exr-compression`.

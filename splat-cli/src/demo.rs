@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use crate::render::{metadata, summary};
 use crate::usage::UsageError;
 use splat_core::{AovSelection, RenderOptions};
-use splat_io::{ExrOptions, PlyEncoding, write_camera_json, write_picture, write_ply};
+use splat_io::{PictureOptions, PlyEncoding, write_camera_json, write_picture, write_ply};
 use std::time::Instant;
 
 /// Runs the command.
@@ -33,7 +33,7 @@ pub fn run(arguments: &DemoArguments) -> anyhow::Result<()> {
     };
     options.check().map_err(UsageError::new)?;
     if let Some(path) = &arguments.output {
-        output::check_picture(path, AovSelection::default())?;
+        output::check_picture(path, AovSelection::default(), false)?;
     }
     for path in [&arguments.save_ply, &arguments.save_camera].into_iter().flatten() {
         output::check_file(path)?;
@@ -51,8 +51,8 @@ pub fn run(arguments: &DemoArguments) -> anyhow::Result<()> {
     let mut engine = Engine::new(EngineChoice::Fast, None, console)?;
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let metadata = metadata(&camera, &options, &engine);
-    let (written, _) =
-        progress.stage("write", |_| write_picture(path, &rendered.film, &metadata, &ExrOptions::default()));
+    let (written, _) = progress
+        .stage("write", |_| write_picture(path, &rendered.film, &metadata, &PictureOptions::default()));
     written?;
     let seconds = start.elapsed().as_secs_f64();
     console.summary(summary(cloud.len(), &rendered.statistics, seconds, path));

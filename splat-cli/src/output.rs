@@ -6,15 +6,17 @@ use splat_core::AovSelection;
 use splat_io::{AtomicFile, PictureFormat};
 use std::path::Path;
 
-/// Checks that a picture with these AOVs can be written there.
+/// Checks that a picture with these AOVs, in files of their own if `separate`, can be written there.
 ///
 /// # Errors
 /// [`UsageError`] for an unknown extension, and for AOVs in a PNG file; otherwise as [`check_file`].
-pub fn check_picture(path: &Path, aovs: AovSelection) -> anyhow::Result<()> {
+pub fn check_picture(path: &Path, aovs: AovSelection, separate: bool) -> anyhow::Result<()> {
     let format = PictureFormat::from_path(path).map_err(UsageError::new)?;
-    if format == PictureFormat::Png && aovs != AovSelection::default() {
-        let message =
-            format!("{}: a PNG file cannot hold what --aov asks for: write an .exr file", path.display());
+    if format == PictureFormat::Png && aovs != AovSelection::default() && !separate {
+        let message = format!(
+            "{}: a PNG file cannot hold what --aov asks for: write an .exr file, or add --aov-files",
+            path.display()
+        );
         return Err(UsageError::new(message).into());
     }
     check_file(path)
@@ -41,10 +43,11 @@ mod tests {
     fn what_cannot_be_written_is_known_at_once() {
         let aovs = AovSelection { depth: true, ..AovSelection::default() };
         let folder = std::env::temp_dir();
-        let check = |name: &str, aovs| check_picture(&folder.join(name), aovs);
+        let check = |name: &str, aovs| check_picture(&folder.join(name), aovs, false);
         assert!(check("splat-check.png", AovSelection::default()).is_ok());
         assert!(check("splat-check.exr", aovs).is_ok());
         assert!(check("splat-check.png", aovs).unwrap_err().is::<UsageError>());
+        assert!(check_picture(&folder.join("splat-check.png"), aovs, true).is_ok());
         assert!(check("splat-check.jpg", aovs).unwrap_err().is::<UsageError>());
         let missing = check("no such folder/x.png", AovSelection::default()).unwrap_err();
         assert!(!missing.is::<UsageError>() && missing.to_string().contains("no such folder"), "{missing}");

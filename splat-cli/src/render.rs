@@ -12,7 +12,7 @@ use crate::{describe, inputs, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
-use splat_io::{ExrOptions, ImportReport, Metadata, read_camera_json, write_picture};
+use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, read_camera_json, write_picture};
 use std::path::Path;
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let options = resolve::options(arguments)?;
-    output::check_picture(&arguments.output, options.aovs)?;
+    output::check_picture(&arguments.output, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
     }
@@ -68,7 +68,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         ..metadata(&camera, &options, &engine)
     };
     let (written, time) = progress.stage("write", |_| {
-        write_picture(&arguments.output, &rendered.film, &metadata, &exr_options(&arguments.outputs))
+        write_picture(&arguments.output, &rendered.film, &metadata, &picture_options(&arguments.outputs))
     });
     times.write = time;
     written?;
@@ -109,11 +109,15 @@ pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Me
     }
 }
 
-fn exr_options(arguments: &OutputArguments) -> ExrOptions {
-    ExrOptions {
-        full_floats: arguments.exr_type == ExrTypeChoice::Float,
-        compression: arguments.exr_compression.into(),
-        ..ExrOptions::default()
+fn picture_options(arguments: &OutputArguments) -> PictureOptions {
+    PictureOptions {
+        exr: ExrOptions {
+            full_floats: arguments.exr_type == ExrTypeChoice::Float,
+            compression: arguments.exr_compression.into(),
+            ..ExrOptions::default()
+        },
+        png_depth: arguments.png_depth.into(),
+        separate_aovs: arguments.aov_files,
     }
 }
 

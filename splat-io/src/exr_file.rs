@@ -13,8 +13,9 @@ use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{Blocks, Encoding, Image, Layer, SmallVec, Vec2, WritableImage, f16};
 use glam::{DMat4, Vec3};
 use splat_core::Film;
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How an EXR file is packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +81,55 @@ impl Compression {
 /// [`Error::Encode`].
 pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata, options: &ExrOptions) -> Result<(), Error> {
     let channels = Channels::new(film, options.full_floats).map_err(Error::core(path))?;
+    write_channels(path, film, channels, metadata, options)
+}
+
+/// Writes each of the film's AOVs as an EXR file of its own beside the picture `path`: for `out.exr` or `out.png` the files
+/// `out.depth.exr`, `out.normal.exr` and so on, with the channels that [`write_exr`] gives them. Returns their paths.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_aov_files(
+    path: &Path,
+    film: &Film,
+    metadata: &Metadata,
+    options: &ExrOptions,
+) -> Result<Vec<PathBuf>, Error> {
+    let channels = Channels::new(film, options.full_floats).map_err(Error::core(path))?;
+    channels
+        .by_aov()
+        .into_iter()
+        .filter(|(aov, _)| *aov != COLOR)
+        .map(|(aov, channels)| {
+            let path = path.with_extension(format!("{aov}.exr"));
+            write_channels(&path, film, channels, metadata, options)?;
+            Ok(path)
+        })
+        .collect()
+}
+
+/// Writes color and alpha alone as an EXR file, for [`write_aov_files`] to do the rest.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_color_exr(
+    path: &Path,
+    film: &Film,
+    metadata: &Metadata,
+    options: &ExrOptions,
+) -> Result<(), Error> {
+    let mut channels = Channels::new(film, options.full_floats).map_err(Error::core(path))?;
+    channels.0.retain(|channel| channel.aov() == COLOR);
+    write_channels(path, film, channels, metadata, options)
+}
+
+fn write_channels(
+    path: &Path,
+    film: &Film,
+    channels: Channels<'_>,
+    metadata: &Metadata,
+    options: &ExrOptions,
+) -> Result<(), Error> {
     let attributes = layer_attributes(film, metadata);
     let encoding = Encoding {
         compression: options.compression.encoding(),
@@ -152,6 +202,9 @@ fn text(text: &str) -> Text {
     Text::from_slice_unchecked(text.as_bytes())
 }
 
+/// The name of what is no AOV.
+const COLOR: &str = "color";
+
 /// The channels of a film, in the order of the file: by name.
 struct Channels<'a>(Vec<Channel<'a>>);
 
@@ -208,9 +261,29 @@ impl<'a> Channels<'a> {
         channels.sort_unstable_by_key(|channel| channel.name);
         Ok(Self(channels))
     }
+
+    /// The channels of each AOV, by its name.
+    fn by_aov(self) -> BTreeMap<&'static str, Self> {
+        let mut aovs: BTreeMap<_, Self> = BTreeMap::new();
+        for channel in self.0 {
+            aovs.entry(channel.aov()).or_insert_with(|| Self(Vec::new())).0.push(channel);
+        }
+        aovs
+    }
 }
 
 impl Channel<'_> {
+    /// The AOV that it belongs to, as `--aov` names it.
+    fn aov(&self) -> &'static str {
+        match self.name.split_once('.').map_or(self.name, |(layer, _)| layer) {
+            "R" | "G" | "B" | "A" => COLOR,
+            "N" => "normal",
+            "P" => "position",
+            "Z" => "depth",
+            layer => layer,
+        }
+    }
+
     /// Writes the values from `start` on, in the machine's byte order, until `bytes` is full.
     fn write(&self, start: usize, bytes: &mut [u8]) {
         match &self.values {

@@ -24,14 +24,14 @@ pub mod texture_file;
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
 pub use error::{Error, Place};
-pub use exr_file::{Compression, ExrOptions, write_exr};
+pub use exr_file::{Compression, ExrOptions, write_aov_files, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
 pub use mesh::{Mesh, MeshImport, Sampled, read_obj, sample_surface};
 pub use metadata::Metadata;
-pub use picture::{PictureFormat, write_picture};
+pub use picture::{PictureFormat, PictureOptions, write_picture};
 pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
-pub use png_file::write_png;
+pub use png_file::{PngDepth, write_png};
 pub use scene_file::{SceneFile, parse_scene, read_scene};
 pub use texture_file::{read_pyramid, read_pyramid_from};

@@ -25,6 +25,21 @@ pub struct Metadata {
 }
 
 impl Metadata {
+    /// What is known, as texts by name, the camera with all its digits; `software` and `options` have names by format.
+    pub(crate) fn texts(&self, software: &'static str, options: &'static str) -> Vec<(&'static str, String)> {
+        let texts = [
+            (software, self.software.clone()),
+            (options, self.options.clone()),
+            ("worldToCamera", self.world_to_camera.as_ref().map(Self::matrix_text)),
+            ("samples", self.samples.map(|samples| samples.to_string())),
+            ("sampleRange", self.sample_range.as_ref().map(|range| format!("{}:{}", range.start, range.end))),
+            ("seed", self.seed.map(|seed| seed.to_string())),
+            ("engine", self.engine.clone()),
+            ("inputHash", self.input_hash.clone()),
+        ];
+        texts.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
+    }
+
     /// The matrix as text: its rows, as the camera JSON lists them, with all digits.
     pub(crate) fn matrix_text(matrix: &DMat4) -> String {
         let row = |row: usize| matrix.row(row).to_array().map(|value| value.to_string()).join(", ");

@@ -1,6 +1,7 @@
 //! Pictures in whichever format the file's name asks for.
 
-use crate::{Error, ExrOptions, Metadata, write_exr, write_png};
+use crate::exr_file::{write_aov_files, write_color_exr};
+use crate::{Error, ExrOptions, Metadata, PngDepth, write_exr, write_png};
 use splat_core::Film;
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use std::path::Path;
 pub enum PictureFormat {
     /// OpenEXR: everything that the film holds.
     Exr,
-    /// PNG: color and alpha, 8 bits each.
+    /// PNG: color and alpha.
     Png,
 }
 
@@ -30,7 +31,18 @@ impl PictureFormat {
     }
 }
 
-/// Writes a picture in the format that the file's extension asks for, in one step ([`crate::AtomicFile`]).
+/// How pictures are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PictureOptions {
+    /// Of EXR files.
+    pub exr: ExrOptions,
+    /// Of PNG files.
+    pub png_depth: PngDepth,
+    /// Whether each AOV becomes an EXR file of its own ([`write_aov_files`]), which lets a PNG file have some, too.
+    pub separate_aovs: bool,
+}
+
+/// Writes a picture in the format that the file's extension asks for, each file in one step ([`crate::AtomicFile`]).
 ///
 /// # Errors
 /// As [`PictureFormat::from_path`], [`write_exr`] and [`write_png`].
@@ -38,12 +50,17 @@ pub fn write_picture(
     path: &Path,
     film: &Film,
     metadata: &Metadata,
-    exr_options: &ExrOptions,
+    options: &PictureOptions,
 ) -> Result<(), Error> {
     match PictureFormat::from_path(path)? {
-        PictureFormat::Exr => write_exr(path, film, metadata, exr_options),
-        PictureFormat::Png => write_png(path, film, metadata),
+        PictureFormat::Exr if options.separate_aovs => write_color_exr(path, film, metadata, &options.exr)?,
+        PictureFormat::Exr => write_exr(path, film, metadata, &options.exr)?,
+        PictureFormat::Png => write_png(path, film, metadata, options.png_depth)?,
     }
+    if options.separate_aovs {
+        write_aov_files(path, film, metadata, &options.exr)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

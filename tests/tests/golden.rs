@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use splat_core::{Film, PixelRect, RenderOptions, render};
-use splat_io::{Metadata, write_png};
+use splat_io::{Metadata, PngDepth, write_png};
 use splat_tests::scenes::{self, GOLDEN_SIZE, Scene};
 
 /// The variable that makes the drawn pictures the expected ones.
@@ -73,7 +73,7 @@ fn assert_golden(name: &str) {
     let expected = std::fs::read_to_string(&path).unwrap_or_default();
     if let Some(difference) = difference(&expected, &found) {
         let picture = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("golden-{name}.png"));
-        let written = match write_png(&picture, &film, &Metadata::default()) {
+        let written = match write_png(&picture, &film, &Metadata::default(), PngDepth::Eight) {
             Ok(()) => format!("the picture drawn now is {}", picture.display()),
             Err(error) => format!("the picture drawn now could not be written: {error}"),
         };

@@ -183,3 +183,27 @@ fn an_empty_or_damaged_film_is_refused() {
     assert!(write_exr(path, &short, &Metadata::default(), &ExrOptions::default()).is_err());
     assert!(!path.exists());
 }
+
+#[test]
+fn each_aov_may_have_a_file_of_its_own() {
+    let film = film(PixelRect::new(0, 0, 64, 48), AovSelection::ALL);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.b.png");
+    let options = ExrOptions::default();
+    let written = write_aov_files(&path, &film, &Metadata::default(), &options).unwrap();
+    let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+    let aovs = ["albedo", "coverage", "depth", "id", "layers", "normal", "position", "samples", "variance"];
+    assert_eq!(names, aovs.map(|aov| format!("a.b.{aov}.exr")));
+    let normal = read_back(&fs::read(&written[5]).unwrap());
+    let channels: Vec<_> = normal.layer_data.channel_data.list.iter().map(|c| c.name.to_string()).collect();
+    assert_eq!(channels, ["N.X", "N.Y", "N.Z"]);
+    let whole = read_back(&write(&film, &Metadata::default(), &options));
+    assert_eq!(samples(&normal, "N.Y"), samples(&whole, "N.Y"));
+    let depth = read_back(&fs::read(&written[2]).unwrap());
+    assert_eq!(samples(&depth, "Z"), samples(&whole, "Z"));
+
+    write_color_exr(&path, &film, &Metadata::default(), &options).unwrap();
+    let color = read_back(&fs::read(&path).unwrap());
+    assert_eq!(color.layer_data.channel_data.list.len(), 4);
+    assert_eq!(samples(&color, "G"), samples(&whole, "G"));
+}
