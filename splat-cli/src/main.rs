@@ -1,7 +1,7 @@
 //! The program `splat`: pictures of surfel clouds.
 //!
 //! Data go to stdout; progress, summaries, warnings and errors go to stderr. Exit codes: 0 success, 1
-//! failure, 2 usage, 130 interrupted.
+//! failure, 2 usage, 130 interrupted, 143 terminated.
 
 #![forbid(unsafe_code)]
 
@@ -14,6 +14,7 @@ mod describe;
 mod engine;
 mod info;
 mod inputs;
+mod interrupt;
 mod material;
 mod output;
 mod progress;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
 
 /// Runs the command of the command line.
 fn run() -> anyhow::Result<()> {
+    interrupt::watch()?;
     let (arguments, matches) = scene::parse(std::env::args_os().collect())?;
     match arguments.command {
         Command::Render(arguments) if arguments.print_config => scene::print(&arguments, &matches),

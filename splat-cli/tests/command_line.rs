@@ -370,3 +370,34 @@ fn real_files_are_rendered_or_refused_and_never_a_panic() {
         }
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_program_that_is_stopped_ends_at_once_and_leaves_nothing() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("out.png"), "old").unwrap();
+        // Minutes of work, of which a moment passes; a machine that is busy may need a second try to be quick.
+        let quickest = (0..5).map(|_| {
+            let mut child = Command::new(PROGRAM)
+                .current_dir(folder.path())
+                .args(["demo", "-o", "out.png", "--size", "4000x3000", "--spp", "256", "--quiet"])
+                .stderr(std::process::Stdio::null())
+                .spawn()
+                .unwrap();
+            std::thread::sleep(Duration::from_millis(700));
+            assert!(child.try_wait().unwrap().is_none(), "it has ended by itself");
+            let start = Instant::now();
+            let kill = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status();
+            assert!(kill.unwrap().success());
+            assert_eq!(child.wait().unwrap().code(), Some(code));
+            start.elapsed()
+        });
+        let quickest = quickest.min().unwrap();
+        assert!(quickest < Duration::from_millis(250), "{signal}: {quickest:?}");
+        let left: Vec<_> =
+            fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["out.png"]);
+        assert_eq!(fs::read(folder.path().join("out.png")).unwrap(), b"old");
+    }
+}

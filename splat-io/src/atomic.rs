@@ -1,9 +1,11 @@
 //! Files that are absent, old, or complete.
 
 use crate::Error;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
 
 /// A file in the making: a temporary beside its target, which takes the target's place on
@@ -17,6 +19,42 @@ pub struct AtomicFile {
     /// Where it goes: the path, symbolic links followed.
     target: PathBuf,
     temporary: NamedTempFile,
+    unfinished: Unfinished,
+}
+
+/// The temporary files of this process.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn all_unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // A set of paths is never half changed.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A temporary file, known to [`abandon_all`] for as long as this lives.
+#[derive(Debug)]
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    fn new(path: &Path) -> Self {
+        all_unfinished().insert(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        all_unfinished().remove(&self.0);
+    }
+}
+
+/// Removes all files in the making, and lets none be begun or finished any more: for a program that is about to end.
+pub fn abandon_all() {
+    let unfinished = all_unfinished();
+    for path in unfinished.iter() {
+        // What cannot be removed stays behind; there is nobody left to tell.
+        _ = fs::remove_file(path);
+    }
+    std::mem::forget(unfinished);
 }
 
 impl AtomicFile {
@@ -39,7 +77,8 @@ impl AtomicFile {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let temporary = builder.tempfile_in(folder).map_err(Error::io(path, "create"))?;
-        Ok(Self { path: path.to_owned(), target, temporary })
+        let unfinished = Unfinished::new(temporary.path());
+        Ok(Self { path: path.to_owned(), target, temporary, unfinished })
     }
 
     /// The path that the file will have.
@@ -53,8 +92,12 @@ impl AtomicFile {
     /// [`Error::Io`]; the target is then what it was before.
     pub fn commit(self) -> Result<(), Error> {
         self.temporary.as_file().sync_all().map_err(Error::io(&self.path, "write"))?;
-        let persisted = self.temporary.persist(&self.target);
-        persisted.map_err(|failure| Error::io(&self.path, "replace")(failure.error))?;
+        let Self { path, target, temporary, unfinished } = self;
+        let lock = all_unfinished();
+        let persisted = temporary.persist(target);
+        drop(lock);
+        drop(unfinished);
+        persisted.map_err(|failure| Error::io(&path, "replace")(failure.error))?;
         Ok(())
     }
 
