@@ -6,20 +6,24 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod cameras;
 mod choices;
 mod console;
 mod convert;
 mod demo;
 mod describe;
 mod engine;
+mod frames;
 mod info;
 mod inputs;
+mod map;
 mod material;
 mod output;
 mod progress;
 mod render;
 mod resolve;
 mod statistics;
+mod turntable;
 mod usage;
 mod values;
 

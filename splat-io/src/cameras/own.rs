@@ -424,7 +424,10 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_their_place() {
         let unknown = message(&pinhole(",\n\"fov\": 40"));
-        assert!(unknown.contains("unknown field `fov`, expected one of `name`, `model`, `width`"), "{unknown}");
+        assert!(
+            unknown.contains("unknown field `fov`, expected one of `name`, `model`, `width`"),
+            "{unknown}"
+        );
         assert!(unknown.contains("line 3 column"), "{unknown}");
         assert!(message(&pinhole(r#", "cx": 1"#)).contains("duplicate field `cx`"));
         assert!(message(&pinhole("").replace("\"cx\": 320,", "")).contains("cx: found nothing"));
