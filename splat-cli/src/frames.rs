@@ -307,8 +307,9 @@ mod tests {
         assert_eq!(index("--camera-name a/01.jpg"), 0);
         assert_eq!(index("--camera-name a/01"), 0);
         assert_eq!(index("--camera-name 01"), 0);
-        assert_eq!(index("--camera-name a/0 --camera-name a/02"), 1);
+        assert_eq!(index("--camera-name a/02"), 1);
         assert_eq!(index("--camera-name b/02.jpg"), 2);
+        assert_eq!(index("--camera-name 01.j"), 0);
         assert_eq!(index("--frames 4"), 3);
         let all = planned(&names, "-o x-##.png --camera FILE").unwrap();
         assert_eq!(
