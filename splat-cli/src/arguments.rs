@@ -102,7 +102,7 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one
+    /// Clouds (.ply, a COLMAP folder or its points3D) and meshes (.obj, sampled as by convert); several are rendered as one
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png

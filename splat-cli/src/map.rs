@@ -32,6 +32,9 @@ const INCH: f64 = 0.0254;
 /// Most pixels of a map that is drawn at once: 4 GiB of colours.
 const MOST_PIXELS: f64 = (1_u64 << 28) as f64;
 
+/// Pixels around the cloud: the widest pixel filter reaches 3/2.
+const MARGIN: f64 = 2.0;
+
 impl MapArguments {
     /// Pixels an inch of the print, if anyone asks for a print.
     pub fn dpi(&self) -> Option<f64> {
@@ -100,7 +103,8 @@ pub fn camera(arguments: &RenderArguments, cloud: &Cloud, options: &RenderOption
     let fitted = fit(cloud, &framing(arguments, cloud), options)?;
     let axes = straight(fitted.linear());
     let (low, high) = reach(cloud, axes, options.cutoff.sqrt());
-    let (first, last) = ((low * pixels_per_unit).floor(), (high * pixels_per_unit).ceil());
+    let first = (low * pixels_per_unit).floor() - MARGIN;
+    let last = (high * pixels_per_unit).ceil() + MARGIN;
     let size = (last - first).max(DVec2::ONE);
     let middle = (first + 0.5 * size) / pixels_per_unit;
     let depth = fitted.world_to_camera.w_axis.z;

@@ -2,6 +2,7 @@
 //!
 //! Positions and colours (8-bit sRGB) are read; errors and tracks are passed over. There are no normals.
 
+use crate::cameras::colmap::Model;
 use crate::cameras::colmap::binary::{count, take};
 use crate::lines::Lines;
 use crate::source::Source;
@@ -10,7 +11,7 @@ use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, U
 use glam::{DVec3, Vec3};
 use splat_core::Cloud;
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bytes of a point without its track: number, place, colour, error, length of the track.
 const POINT_BYTES: u64 = 8 + 24 + 3 + 8 + 8;
@@ -18,9 +19,13 @@ const POINT_BYTES: u64 = 8 + 24 + 3 + 8 + 8;
 /// Bytes of an entry of a track: image and point.
 const TRACK_BYTES: u64 = 8;
 
-/// Whether a file is one of COLMAP's points, by its name.
-pub fn is_points3d(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name == "points3D.txt" || name == "points3D.bin")
+/// The file of COLMAP's points that a path means: itself, by its name, or that of the model in a folder.
+pub fn find_points3d(path: &Path) -> Option<PathBuf> {
+    if path.is_dir() {
+        return Some(Model::find(path)?.file("points3D"));
+    }
+    let is_points = path.file_name().is_some_and(|name| name == "points3D.txt" || name == "points3D.bin");
+    is_points.then(|| path.to_owned())
 }
 
 /// Reads the points of a COLMAP model; text if the name ends in `.txt`. See the [module](self).

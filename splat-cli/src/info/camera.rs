@@ -96,7 +96,8 @@ impl One {
             field_of_view,
             pixels_per_unit,
             principal_point: camera.principal_point.to_array(),
-            eye: camera.eye().to_array(),
+            // Adding 0 makes 0 of -0.
+            eye: (camera.eye() + 0.0).to_array(),
             forward: camera.linear().row(2).normalize_or_zero().to_array(),
             near: Some(camera.near).filter(|&near| near != UNKNOWN_NEAR),
             far: finite(camera.far),

@@ -82,8 +82,9 @@ impl Summary {
     /// # Errors
     /// What the reader says.
     pub fn read(path: &Path) -> Result<Self, splat_io::Error> {
-        let is_points3d = splat_io::points3d::is_points3d(path);
-        let Import { cloud, report } = if is_points3d { read_points3d(path) } else { read_ply(path) }?;
+        let points = splat_io::points3d::find_points3d(path);
+        let Import { cloud, report } =
+            points.map_or_else(|| read_ply(path), |points| read_points3d(&points))?;
         Ok(Self::new(cloud, report))
     }
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// The files of a model.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Model {
+pub(crate) struct Model {
     folder: PathBuf,
     is_binary: bool,
 }
@@ -36,7 +36,8 @@ impl Model {
         is_known.then(|| Self { folder: path.parent().unwrap_or(Path::new("")).to_owned(), is_binary })
     }
 
-    fn file(&self, stem: &str) -> PathBuf {
+    /// One of its files.
+    pub fn file(&self, stem: &str) -> PathBuf {
         self.folder.join(stem).with_extension(if self.is_binary { "bin" } else { "txt" })
     }
 }
