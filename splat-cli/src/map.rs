@@ -180,3 +180,93 @@ pub fn describe(arguments: &MapArguments, camera: &Camera) -> Option<String> {
         scale * INCH / dpi
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+
+    /// Three splats in map coordinates, 30 m east and 20 m north of each other, one of them turned.
+    fn cloud() -> Cloud {
+        let corner = DVec3::new(636_001.76, 5_848_935.2, 406.26);
+        let points = [corner, corner + DVec3::new(30.0, 0.0, 5.0), corner + DVec3::new(0.0, 20.0, 1.0)];
+        let mut cloud = Cloud::from_points(&points);
+        cloud.normals = vec![glam::Vec3::Z, glam::Vec3::X, glam::Vec3::Z];
+        cloud.shapes = Shapes::Discs(vec![0.25; 3]);
+        cloud
+    }
+
+    fn map(options: &str) -> anyhow::Result<(Camera, RenderOptions)> {
+        let line = ["splat", "render", "in.ply", "-o", "x.png"].into_iter().chain(options.split_whitespace());
+        let Command::Render(arguments) = Arguments::parse_from(line).command else { panic!("not render") };
+        let options = crate::resolve::options(&arguments)?;
+        Ok((camera(&arguments, &cloud(), &options)?, options))
+    }
+
+    /// Where a camera draws a splat of the cloud.
+    fn pixel(camera: &Camera, index: usize) -> DVec2 {
+        let p = camera.world_to_camera.transform_point3(cloud().world_position(index));
+        p.truncate() * camera.pixel_scale() + camera.principal_point
+    }
+
+    #[test]
+    fn a_pixel_is_the_scale_times_an_inch_over_the_dots_an_inch() {
+        for (options, metres) in [
+            ("--scale 1:200", 200.0 * 0.0254 / 300.0),
+            ("--scale 1:500 --dpi 72.5", 500.0 * 0.0254 / 72.5),
+            ("--scale 1:1000 --unit ft", 1000.0 * 0.0254 / 300.0 / 0.3048),
+            ("--scale 1:1000 --unit us-ft --up z", 1000.0 * 0.0254 / 300.0 / (1200.0 / 3937.0)),
+            ("--scale 1:10 --unit mm --crop 0,0,1,1", 10.0 * 25.4 / 300.0),
+        ] {
+            let (camera, _) = map(&format!("--ortho top {options}")).unwrap();
+            let east = pixel(&camera, 1) - pixel(&camera, 0);
+            let north = pixel(&camera, 2) - pixel(&camera, 0);
+            // Coordinates of 6e6 in `f64` leave 1e-9 units.
+            assert!((east - DVec2::new(30.0 / metres, 0.0)).abs().max_element() < 1e-6, "{options}: {east}");
+            assert!(
+                (north - DVec2::new(0.0, -20.0 / metres)).abs().max_element() < 1e-6,
+                "{options}: {north}"
+            );
+            // Where the pixels begin, counted from the world's zero.
+            let corner = cloud().world_position(0) / metres;
+            let first = DVec2::new(corner.x, -corner.y) - pixel(&camera, 0);
+            assert!((first - first.round()).abs().max_element() < 1e-6, "{options}: {first}");
+        }
+    }
+
+    #[test]
+    fn the_picture_holds_every_splat_and_little_more() {
+        for view in ["top", "bottom", "front", "back", "left", "right"] {
+            let (camera, options) = map(&format!("--ortho {view} --scale 1:100 --dpi 25.4")).unwrap();
+            assert!((camera.pixel_scale() - 10.0).abs().max_element() < 1e-12, "{view}");
+            let (low, high) = reach(&cloud(), straight(camera.linear()), options.cutoff.sqrt());
+            let size = DVec2::new(camera.width.into(), camera.height.into());
+            let excess = size - 10.0 * (high - low);
+            assert!(
+                excess.min_element() >= 2.0 * MARGIN && excess.max_element() < 2.0 * MARGIN + 2.0,
+                "{view}: {excess}"
+            );
+            assert_eq!(camera.principal_point, 0.5 * size);
+        }
+    }
+
+    #[test]
+    fn a_map_that_is_too_large_says_what_to_change() {
+        let error = map("--ortho top --scale 1:1 --unit km").unwrap_err();
+        assert!(error.is::<UsageError>());
+        let message = error.to_string();
+        assert!(message.starts_with("1:1 at 300 dpi is a picture of 360236"), "{message}");
+        assert!(message.contains("limit of 65536 a side") && message.contains("--unit"), "{message}");
+    }
+
+    #[test]
+    fn scales_and_resolutions() {
+        assert_eq!([scale("1:200"), scale("1: 0.5")], [Ok(200.0), Ok(0.5)]);
+        for text in ["200", "1:0", "1:-1", "1:inf", "2:1", "1:x", ""] {
+            assert!(scale(text).is_err(), "{text}");
+        }
+        assert_eq!(dpi("300"), Ok(300.0));
+        assert!(["0", "nan", "1e9"].iter().all(|text| dpi(text).is_err()));
+    }
+}

@@ -68,7 +68,7 @@ fn a_print_is_to_scale_and_says_its_resolution() {
     let cloud = discs(&[(red, RED), (red + DVec3::new(10.0, 5.0, 3.0), BLUE)]);
     write_ply(&folder.path().join("in.ply"), &cloud, PlyEncoding::Binary).unwrap();
     let line =
-        "render in.ply -o map.png --ortho top --spp 16 --shading color --kernel disc --coverage opaque";
+        "render in.ply -o map.png --ortho top --spp 256 --shading color --kernel disc --coverage opaque";
     let said = succeeds(folder.path(), &format!("{line} --scale 1:200 --dpi 254"));
     // A pixel is 200 * 0.0254 / 254 = 0.02 m; the picture holds both discs.
     assert!(said.contains("1:200 at 254 dpi: 506x256 pixels, 51 x 26 mm; a pixel is 0.020000 m"), "{said}");
@@ -88,7 +88,7 @@ fn a_print_is_to_scale_and_says_its_resolution() {
         sum / weight
     };
     let (red, blue) = (middle(0), middle(2));
-    // 10 m are 500 pixels, 5 m are 250; east is right and north is up. Sixteen samples a pixel place a disc this well:
+    // 10 m are 500 pixels, 5 m are 250; east is right and north is up. By 800 samples of a scatter of one pixel, at most:
     assert!((blue - red - glam::DVec2::new(500.0, -250.0)).abs().max_element() < 0.1, "{red} {blue}");
     // Pixels begin at multiples of their size from zero: the red point, on a corner of four pixels, is one pixel, and two of margin, from the edge.
     assert!((red - glam::DVec2::new(3.0, 253.0)).abs().max_element() < 0.1, "{red}");

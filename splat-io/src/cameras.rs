@@ -30,7 +30,6 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use splat_core::{Camera, Distortion, Projection};
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -164,23 +163,13 @@ fn read_text_file(path: &Path, defaults: &CameraDefaults) -> Result<CameraSet, E
 
 /// A whole file of text.
 fn read_text(path: &Path, most_mebibytes: u64) -> Result<String, Error> {
-    let (file, size) = crate::ply::open(path)?;
-    read_text_from(file, size, path, most_mebibytes)
-}
-
-fn read_text_from(file: File, size: u64, path: &Path, most_mebibytes: u64) -> Result<String, Error> {
     let most = most_mebibytes << 20;
-    let limit = || {
-        let limit = format!("{most_mebibytes} MiB");
-        Error::limit(path, format!("a camera file of more than {limit}"), limit)
-    };
-    if size > most {
-        return Err(limit());
-    }
+    let (file, _) = crate::ply::open(path)?;
     let mut bytes = Vec::new();
     file.take(most + 1).read_to_end(&mut bytes).map_err(Error::io(path, "read"))?;
     if bytes.len() as u64 > most {
-        return Err(limit());
+        let limit = format!("{most_mebibytes} MiB");
+        return Err(Error::limit(path, format!("a camera file of more than {limit}"), limit));
     }
     String::from_utf8(bytes).map_err(|error| {
         let place = error.utf8_error().valid_up_to();
@@ -226,12 +215,16 @@ impl Intrinsics {
 }
 
 impl NamedCamera {
-    /// A camera of a file, checked. Without a name it is called by its place, counted from 0.
-    fn new(name: Option<String>, index: usize, camera: Camera, path: &Path) -> Result<Self, Error> {
-        let name = name.filter(|name| !name.is_empty()).unwrap_or_else(|| format!("camera_{:04}", index + 1));
+    /// A camera of a file, checked.
+    fn new(name: String, camera: Camera, path: &Path) -> Result<Self, Error> {
         check(&camera, path).map_err(|error| error.of_camera(&name))?;
         Ok(Self { name, camera })
     }
+}
+
+/// A camera's name: without one it is called by its place, counted from 0 here and from 1 there.
+fn name_or_number(name: Option<String>, index: usize) -> String {
+    name.filter(|name| !name.is_empty()).unwrap_or_else(|| format!("camera_{:04}", index + 1))
 }
 
 /// Checks a camera's values.

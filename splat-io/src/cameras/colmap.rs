@@ -3,7 +3,7 @@
 pub(crate) mod binary;
 mod text;
 
-use super::{CameraSet, Intrinsics, NamedCamera};
+use super::{CameraSet, Intrinsics, NamedCamera, name_or_number};
 use crate::{Error, Place};
 use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 use splat_core::Distortion;
@@ -65,13 +65,14 @@ pub(super) fn read(model: &Model, path: &Path, near: f64) -> Result<CameraSet, E
     };
     // Binary files have the images in no order that means anything.
     posed.sort_by(|a, b| a.name.cmp(&b.name));
-    let named = posed.into_iter().enumerate().map(|(index, posed)| {
+    let named = posed.into_iter().enumerate().map(|(index, mut posed)| {
+        posed.name = name_or_number(Some(posed.name), index);
         let lens = lenses.get(&posed.camera).ok_or_else(|| {
             let place = Place::Camera { name: posed.name.clone(), field: Some("CAMERA_ID") };
             Error::invalid(&images, place, posed.camera.to_string(), "a camera of the other file")
         })?;
         let pose = pose(&posed, &images).map_err(|error| error.of_camera(&posed.name))?;
-        NamedCamera::new(Some(posed.name), index, lens.camera(pose, near), path)
+        NamedCamera::new(posed.name, lens.camera(pose, near), path)
     });
     Ok(CameraSet {
         path: path.to_owned(),

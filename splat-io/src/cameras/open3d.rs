@@ -1,6 +1,8 @@
 //! Open3D: JSON of pinhole cameras, and `.log` trajectories.
 
-use super::{CameraDefaults, CameraSet, Intrinsics, NamedCamera, from_json, inverse, similarity};
+use super::{
+    CameraDefaults, CameraSet, Intrinsics, NamedCamera, from_json, inverse, name_or_number, similarity,
+};
 use crate::error::quoted;
 use crate::{Error, Place};
 use glam::{DMat4, DVec2, DVec4};
@@ -54,9 +56,9 @@ fn set(
     let cameras = parameters.iter().enumerate().map(|(index, ParametersJson { extrinsic, intrinsic })| {
         let camera = similarity(DMat4::from_cols_array(extrinsic), path, "extrinsic")
             .and_then(|pose| Ok(intrinsics(intrinsic, path)?.camera(pose, near)));
-        let name = format!("camera_{:04}", index + 1);
+        let name = name_or_number(None, index);
         let camera = camera.map_err(|error| error.of_camera(&name))?;
-        NamedCamera::new(Some(name), index, camera, path)
+        NamedCamera::new(name, camera, path)
     });
     let cameras = cameras.collect::<Result<_, _>>()?;
     Ok(CameraSet { path: path.to_owned(), format, cameras, assumptions: vec![HALF_PIXEL.to_owned()] })
@@ -71,7 +73,7 @@ pub(super) fn read_intrinsic(text: &str, path: &Path, near: f64) -> Result<Camer
     Ok(CameraSet {
         path: path.to_owned(),
         format: "Open3D camera intrinsic",
-        cameras: vec![NamedCamera::new(None, 0, camera, path)?],
+        cameras: vec![NamedCamera::new(name_or_number(None, 0), camera, path)?],
         assumptions: vec![place.to_owned(), HALF_PIXEL.to_owned()],
     })
 }
@@ -127,12 +129,12 @@ pub(super) fn read_log(text: &str, path: &Path, defaults: &CameraDefaults) -> Re
             })?;
         }
         let [x, y, z, w] = rows;
-        let index = cameras.len();
+        let name = name_or_number(None, cameras.len());
         let place = similarity(DMat4::from_cols(x, y, z, w).transpose(), path, "matrix");
-        let place = place.map_err(|error| error.of_camera(&format!("camera_{:04}", index + 1)))?;
+        let place = place.map_err(|error| error.of_camera(&name))?;
         let mut camera = Camera { world_to_camera: inverse(place), ..intrinsic.clone() };
         camera.near = defaults.near * camera.scale();
-        cameras.push(NamedCamera::new(None, index, camera, path)?);
+        cameras.push(NamedCamera::new(name, camera, path)?);
     }
     Ok(CameraSet {
         path: path.to_owned(),

@@ -20,12 +20,11 @@
 //!
 //! Without `fstop` or `lens_radius` there is no lens, and `focus` and `blades` say nothing.
 
-use super::{CameraSet, NamedCamera, check, from_json, read_text_from};
+use super::{CameraSet, NamedCamera, check, from_json, name_or_number, read_text};
 use crate::{AtomicFile, Error, Place};
 use glam::{DMat4, DVec2};
 use serde::{Deserialize, Deserializer, Serialize};
 use splat_core::{Camera, Distortion, Lens, Projection};
-use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
@@ -104,8 +103,7 @@ fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f
 /// [`Error::Io`]; [`Error::Limit`] beyond 1 MiB; [`Error::Invalid`] if it is no UTF-8; otherwise as
 /// [`parse_camera_json`].
 pub fn read_camera_json(path: &Path, default_near: f64) -> Result<Camera, Error> {
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    parse_camera_json(&read_text_from(file, 0, path, MOST_MEBIBYTES)?, path, default_near)
+    parse_camera_json(&read_text(path, MOST_MEBIBYTES)?, path, default_near)
 }
 
 /// Reads a camera from JSON text; `path` is its name in messages, `default_near` as in [`read_camera_json`].
@@ -125,7 +123,7 @@ pub(super) fn read_one(text: &str, path: &Path, near: f64) -> Result<CameraSet, 
     let json: CameraJson = from_json(text, path)?;
     let camera = camera(&json, path, near)?;
     check(&camera, path)?;
-    let cameras = vec![NamedCamera::new(json.name, 0, camera, path)?];
+    let cameras = vec![NamedCamera::new(name_or_number(json.name, 0), camera, path)?];
     Ok(CameraSet { path: path.to_owned(), format: ONE, cameras, assumptions: Vec::new() })
 }
 
@@ -136,9 +134,9 @@ const ONE: &str = "camera";
 pub(super) fn read_list(text: &str, path: &Path, near: f64) -> Result<CameraSet, Error> {
     let ListJson { cameras } = from_json(text, path)?;
     let cameras = cameras.into_iter().enumerate().map(|(index, json)| {
-        let name = json.name.clone().unwrap_or_else(|| format!("camera_{:04}", index + 1));
+        let name = name_or_number(json.name.clone(), index);
         let camera = camera(&json, path, near).map_err(|error| error.of_camera(&name))?;
-        NamedCamera::new(Some(name), index, camera, path)
+        NamedCamera::new(name, camera, path)
     });
     Ok(CameraSet {
         path: path.to_owned(),

@@ -1,6 +1,6 @@
 //! `cameras.json` beside a trained 3DGS model: a list of the cameras that it was trained with.
 
-use super::{CameraSet, Intrinsics, NamedCamera, from_json, inverse, similarity};
+use super::{CameraSet, Intrinsics, NamedCamera, from_json, inverse, name_or_number, similarity};
 use crate::Error;
 use glam::{DMat3, DMat4, DVec2, DVec3};
 use serde::Deserialize;
@@ -27,7 +27,7 @@ pub(super) fn read(text: &str, path: &Path, near: f64) -> Result<CameraSet, Erro
     let cameras = entries.into_iter().enumerate().map(|(index, entry)| {
         let mut place = DMat4::from_mat3(DMat3::from_cols_array_2d(&entry.rotation).transpose());
         place.w_axis = DVec3::from_array(entry.position).extend(1.0);
-        let name = entry.img_name.unwrap_or_default();
+        let name = name_or_number(entry.img_name, index);
         let place = similarity(place, path, "rotation").map_err(|error| error.of_camera(&name))?;
         let size = [entry.width, entry.height];
         let intrinsics = Intrinsics {
@@ -36,7 +36,7 @@ pub(super) fn read(text: &str, path: &Path, near: f64) -> Result<CameraSet, Erro
             principal_point: 0.5 * DVec2::from_array(size.map(f64::from)),
             distortion: Distortion::default(),
         };
-        NamedCamera::new(Some(name), index, intrinsics.camera(inverse(place), near), path)
+        NamedCamera::new(name, intrinsics.camera(inverse(place), near), path)
     });
     Ok(CameraSet {
         path: path.to_owned(),

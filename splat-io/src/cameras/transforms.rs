@@ -1,6 +1,8 @@
 //! `transforms.json` of nerfstudio, instant-ngp and Blender's synthetic scenes.
 
-use super::{CameraDefaults, CameraSet, Intrinsics, NamedCamera, from_json, inverse, side, similarity};
+use super::{
+    CameraDefaults, CameraSet, Intrinsics, NamedCamera, from_json, inverse, name_or_number, side, similarity,
+};
 use crate::{Error, Place};
 use glam::{DMat4, DVec2, DVec4};
 use serde::Deserialize;
@@ -13,23 +15,19 @@ use std::path::Path;
 /// Width and height of the pictures of Blender's synthetic scenes, which their files do not say.
 const BLENDER_SIZE: [u32; 2] = [800, 800];
 
-/// The file.
+/// What each frame says. The text is read once for [`Pose`] and once for [`Fields`]: a flattened structure would keep a
+/// copy of all else that is in the file.
 #[derive(Debug, Deserialize)]
-struct Transforms {
-    /// What holds for frames that do not say otherwise.
-    #[serde(flatten)]
-    shared: Fields,
-    frames: Vec<Frame>,
+struct Frames<T> {
+    frames: Vec<T>,
 }
 
-/// One camera.
+/// Where a camera is.
 #[derive(Debug, Deserialize)]
-struct Frame {
+struct Pose {
     file_path: Option<String>,
     /// Camera to world, rows.
     transform_matrix: Vec<[f64; 4]>,
-    #[serde(flatten)]
-    own: Fields,
 }
 
 /// What may stand at the top or in a frame; lengths are in pixels, angles in radians.
@@ -141,14 +139,17 @@ impl Fields {
 
 /// Reads the file.
 pub(super) fn read(text: &str, path: &Path, defaults: &CameraDefaults) -> Result<CameraSet, Error> {
-    let Transforms { shared, frames } = from_json(text, path)?;
+    let shared: Fields = from_json(text, path)?;
+    let own: Frames<Fields> = from_json(text, path)?;
+    let poses: Frames<Pose> = from_json(text, path)?;
     let mut assumptions = BTreeSet::new();
-    let cameras = frames.into_iter().enumerate().map(|(index, frame)| {
-        let name = frame.file_path.unwrap_or_default();
-        let fields = frame.own.or(&shared);
-        let camera = camera(&fields, &frame.transform_matrix, &name, path, defaults, &mut assumptions);
+    let frames = own.frames.into_iter().zip(poses.frames).enumerate();
+    let cameras = frames.map(|(index, (own, pose))| {
+        let name = name_or_number(pose.file_path, index);
+        let fields = own.or(&shared);
+        let camera = camera(&fields, &pose.transform_matrix, &name, path, defaults, &mut assumptions);
         let camera = camera.map_err(|error| error.of_camera(&name))?;
-        NamedCamera::new(Some(name), index, camera, path)
+        NamedCamera::new(name, camera, path)
     });
     Ok(CameraSet {
         path: path.to_owned(),
