@@ -6,6 +6,8 @@ use crate::choices::{
     TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
+use crate::frames::FrameArguments;
+use crate::map::MapArguments;
 use crate::scene::Scene;
 use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
@@ -68,7 +70,7 @@ pub const DEFAULT_POINTS: usize = 200_000;
 /// `splat info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
-    /// A cloud (.ply), a mesh (.obj) or a camera (.json)
+    /// A cloud (.ply, points3D of COLMAP), a mesh (.obj) or cameras (.json, .log, a COLMAP folder)
     pub file: PathBuf,
     /// Write JSON
     #[arg(long)]
@@ -101,7 +103,8 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one; a scene file (.toml)
+    /// Clouds (.ply, a COLMAP folder or its points3D) and meshes (.obj, sampled as by convert), several as one; or a
+    /// scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
@@ -136,19 +139,27 @@ pub struct RenderArguments {
 /// The camera: from a file, or fitted to the cloud.
 #[derive(Debug, Clone, Default, Args)]
 pub struct CameraArguments {
-    /// A camera (.json) instead of one that is fitted to the cloud
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["view", "up", "ortho", "size"])]
+    /// Cameras instead of one that is fitted to the cloud: our JSON, a COLMAP folder, transforms.json, Open3D's JSON or .log,
+    /// cameras.json of 3DGS
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["view", "up", "ortho"])]
     pub camera: Option<PathBuf>,
+    /// Which of several cameras.
+    #[command(flatten)]
+    pub frames: FrameArguments,
     /// front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees [default: 30,20]
     #[arg(long, value_name = "VIEW", value_parser = values::view, allow_hyphen_values = true)]
     pub view: Option<ViewDirection>,
     /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub up: Option<UpChoice>,
-    /// An orthographic camera
-    #[arg(long, conflicts_with_all = ["fstop", "lens_radius", "focus", "blades"])]
-    pub ortho: bool,
-    /// Width and height of the picture, in pixels [default: 1280x960]
+    /// An orthographic camera, from top, bottom, front, back, left or right or else as --view says
+    #[arg(long, value_name = "VIEW", num_args = 0..=1, value_parser = values::face)]
+    #[arg(conflicts_with_all = ["fstop", "lens_radius", "focus", "blades"])]
+    pub ortho: Option<Option<ViewDirection>>,
+    /// The scale of a print.
+    #[command(flatten)]
+    pub map: MapArguments,
+    /// Width and height of the picture, in pixels; of the shape of a camera's own [default: its own, or 1280x960]
     #[arg(long, value_name = "WxH", value_parser = values::size, help_heading = "Film")]
     pub size: Option<[u32; 2]>,
     /// f-number of a thin lens whose image plane is at distance 1, in camera units
@@ -357,7 +368,13 @@ mod tests {
         assert_eq!(arguments.samples.samples, Some(0..4));
         assert_eq!(arguments.outputs.stats, Some(PathBuf::from("-")));
         render("--camera cam.json --tile 0/2x2 --lens-radius 0.1 -v").unwrap();
-        render("--ortho").unwrap();
+        assert_eq!(render("--ortho --view top").unwrap().camera.ortho, Some(None));
+        let top = ViewDirection { azimuth: 0.0, elevation: 90.0 };
+        let map = render("--ortho top --scale 1:200 --dpi 300 --unit us-ft").unwrap().camera;
+        assert_eq!((map.ortho, map.map.scale, map.map.dpi), (Some(Some(top)), Some(200.0), Some(300.0)));
+        render("--camera c.json --size 4x4 --camera-name a --intrinsic i.json").unwrap();
+        render("--camera c.json --frames 1-10x2,5").unwrap();
+        render("--turntable 36 --view 10,20 --up z --frames 1-18").unwrap();
     }
 
     #[test]
@@ -370,7 +387,10 @@ mod tests {
     #[test]
     fn contradictions_are_refused() {
         let contradictions = [
-            "--camera c.json --size 4x4",
+            "--camera c.json --turntable 4",
+            "--camera c.json --camera-name a --frames 1",
+            "--ortho --scale 1:2 --size 4x4",
+            "--ortho --scale 1:2 --turntable 4",
             "--camera c.json --view front",
             "--camera c.json --up z",
             "--camera c.json --ortho",
@@ -389,6 +409,12 @@ mod tests {
 
     #[test]
     fn wrong_values_are_refused() {
+        for line in ["--frames 0", "--turntable 0", "--ortho up", "--ortho --scale 200", "--dpi 0"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
+        }
+        for line in ["--scale 1:2", "--camera-name a", "--ortho --unit m", "--intrinsic a"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::MissingRequiredArgument, "{line}");
+        }
         for line in ["--size 0x4", "--focus 0", "--aov z", "--wsat 0", "--radius-scale 0", "--view 1"] {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }

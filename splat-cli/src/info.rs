@@ -6,14 +6,14 @@ mod mesh;
 
 use crate::arguments::InfoArguments;
 use crate::{console, inputs};
-use std::path::Path;
+use splat_io::cameras::is_camera_path;
 
 /// Runs the command.
 ///
 /// # Errors
 /// What the reader says; what the operating system says about stdout.
 pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
-    let (json, text) = if is_camera(&arguments.file) {
+    let (json, text) = if is_camera_path(&arguments.file) {
         let summary = camera::Summary::read(&arguments.file)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else if inputs::is_obj(&arguments.file) {
@@ -24,9 +24,4 @@ pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     };
     Ok(console::data(&if arguments.json { json + "\n" } else { text })?)
-}
-
-/// Whether a file is a camera, by its name.
-fn is_camera(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }

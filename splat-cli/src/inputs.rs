@@ -5,8 +5,8 @@ use anyhow::{Context, bail, ensure};
 use glam::DVec3;
 use splat_core::{Cloud, Shapes};
 use splat_io::{
-    Import, ImportReport, MeshImport, Sampled, ply_has_faces, read_obj, read_ply, read_ply_mesh,
-    sample_surface,
+    Import, ImportReport, MeshImport, Sampled, ply_has_faces, points3d::find_points3d, read_obj, read_ply,
+    read_ply_mesh, read_points3d, sample_surface,
 };
 use std::path::{Path, PathBuf};
 
@@ -60,7 +60,9 @@ pub fn is_obj(path: &Path) -> bool {
 
 /// Reads a cloud, or a mesh as a cloud.
 fn read_one(path: &Path, reading: Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
-    if is_obj(path) {
+    if let Some(points) = find_points3d(path) {
+        Ok(read_points3d(&points)?)
+    } else if is_obj(path) {
         sampled(read_obj(path)?, reading.sampling, progress)
     } else if reading.with_faces && ply_has_faces(path)? {
         sampled(read_ply_mesh(path)?, reading.sampling, progress)

@@ -6,15 +6,18 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod cameras;
 mod choices;
 mod console;
 mod convert;
 mod demo;
 mod describe;
 mod engine;
+mod frames;
 mod info;
 mod inputs;
 mod interrupt;
+mod map;
 mod material;
 mod output;
 mod progress;
@@ -22,6 +25,7 @@ mod render;
 mod resolve;
 mod scene;
 mod statistics;
+mod turntable;
 mod usage;
 mod values;
 

@@ -1,19 +1,20 @@
 //! `splat render`: clouds in, a picture out.
 
 use crate::arguments::{OutputArguments, RenderArguments};
+use crate::cameras::Fitted;
 use crate::choices::ExrTypeChoice;
 use crate::console::Console;
 use crate::engine::Engine;
 use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
-use crate::statistics::{Report, Times, is_stdout};
+use crate::statistics::{self, Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{describe, inputs, material, output, resolve};
+use crate::{describe, frames, inputs, map, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
-use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, read_camera_json, write_picture};
-use std::path::Path;
+use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, write_picture};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Runs the command.
@@ -38,8 +39,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     times.read = time;
     let (mut cloud, reports) = input?;
     note_assumptions(console, &cloud, &reports);
-    let camera_path = arguments.camera.camera.as_deref();
-    let camera = camera_path.map(|path| read_camera_json(path, resolve::default_near(&cloud))).transpose()?;
+    let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
 
     let ((), time) = progress.stage("prepare", |_| {
         let areas = options.resolve != Resolve::Over;
@@ -51,36 +51,78 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     });
     times.prepare = time;
     inputs::check_usable(&cloud, &reports)?;
-    let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
     let up = resolve::up(&arguments.camera, &cloud);
-    options.material = material::material(&arguments.material, images, &cloud, up)?.into();
-    options.check()?;
+    let material = material::material(&arguments.material, images, &cloud, up)?;
+    let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
+    let fitted = is_fitted.then(|| Fitted::new(arguments, &cloud, &options)).transpose()?;
 
-    let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
-    let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-    let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
-    if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
-        in_words += &format!(" --light {azimuth},{elevation}");
+    let count = shots.len();
+    let mut statistics = Vec::with_capacity(count);
+    for (number, shot) in (1..).zip(shots) {
+        let camera = shot.camera.or_else(|| Some(fitted.as_ref()?.camera(shot.index)));
+        let camera = camera.expect("a shot has a camera, or there is a fitted one");
+        let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
+        let options = RenderOptions { material: material.clone().into(), ..options };
+        options.check()?;
+        let picture =
+            Picture { arguments, cloud: &cloud, reports: &reports, camera, options, path: shot.output };
+        let progress = progress.frame(number, count);
+        statistics.push(picture.make(&mut engine, &progress, &mut times, start)?);
     }
-    let metadata = Metadata {
-        input_hash: Some(hashes.join(" ")),
-        options: Some(in_words),
-        ..metadata(&camera, &options, &engine)
-    };
-    let (written, time) = progress.stage("write", |_| {
-        write_picture(&arguments.output, &rendered.film, &metadata, &picture_options(&arguments.outputs))
-    });
-    times.write = time;
-    written?;
-    times.total = start.elapsed();
-
-    let read = cloud.len();
-    warn_of_losses(console, &rendered.statistics);
-    console.summary(summary(read, &rendered.statistics, times.total.as_secs_f64(), &arguments.output));
     if let Some(path) = &arguments.outputs.stats {
-        Report::new(read, &rendered.statistics, times, &engine).write(path)?;
+        statistics::write(&statistics, path)?;
     }
     Ok(())
+}
+
+/// A picture to be made.
+struct Picture<'a> {
+    arguments: &'a RenderArguments,
+    cloud: &'a Cloud,
+    reports: &'a [ImportReport],
+    camera: Camera,
+    options: RenderOptions,
+    path: PathBuf,
+}
+
+impl Picture<'_> {
+    /// Renders and writes it, and says what it took.
+    fn make(
+        self,
+        engine: &mut Engine,
+        progress: &Progress,
+        times: &mut Times,
+        start: Instant,
+    ) -> anyhow::Result<Report> {
+        let Self { arguments, cloud, reports, camera, options, path } = self;
+        let console = arguments.talk.console();
+        let rendered = engine.render(cloud, &camera, &options, progress, console)?;
+        let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
+        let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
+        if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
+            in_words += &format!(" --light {azimuth},{elevation}");
+        }
+        let metadata = Metadata {
+            input_hash: Some(hashes.join(" ")),
+            options: Some(in_words),
+            pixels_per_inch: arguments.camera.map.dpi(),
+            ..metadata(&camera, &options, engine)
+        };
+        let (written, time) = progress.stage("write", |_| {
+            write_picture(&path, &rendered.film, &metadata, &picture_options(&arguments.outputs))
+        });
+        times.write = time;
+        written?;
+        times.total = start.elapsed();
+
+        let read = cloud.len();
+        warn_of_losses(console, &rendered.statistics);
+        console.summary(summary(read, &rendered.statistics, times.total.as_secs_f64(), &path));
+        if let Some(print) = map::describe(&arguments.camera.map, &camera) {
+            console.summary(print);
+        }
+        Ok(Report::new(read, &rendered.statistics, *times, engine))
+    }
 }
 
 /// Says what was assumed of files and cloud, if anyone wants to know.
@@ -105,7 +147,7 @@ pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Me
         seed: Some(options.seed),
         engine: Some(engine.name().to_owned()),
         options: Some(describe::options(options)),
-        input_hash: None,
+        ..Metadata::default()
     }
 }
 

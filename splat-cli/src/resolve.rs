@@ -10,7 +10,7 @@ use crate::usage::UsageError;
 use crate::values::{ThicknessValue, ViewDirection};
 use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
-use splat_core::fit::{Framing, NEAR, Up, direction, fit};
+use splat_core::fit::{Framing, NEAR, Up, direction};
 use splat_core::{Camera, Cloud, Kernel, Lens, PixelRect, Projection, RenderOptions};
 
 /// Size of the picture where neither an option nor a camera says anything, in pixels.
@@ -27,7 +27,10 @@ const DEFAULT_LIGHT: ViewDirection = ViewDirection { azimuth: 45.0, elevation: 4
 /// # Errors
 /// Values out of range, and options that contradict each other.
 pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError> {
-    let CameraArguments { camera, fstop, lens_radius, focus, blades, .. } = &arguments.camera;
+    let CameraArguments { camera, view, ortho, fstop, lens_radius, focus, blades, .. } = &arguments.camera;
+    if view.is_some() && ortho.flatten().is_some() {
+        return Err(UsageError::new("--ortho says from where already: leave out --view"));
+    }
     let has_lens = fstop.is_some() || lens_radius.is_some();
     if camera.is_none() && !has_lens && (focus.is_some() || blades.is_some()) {
         return Err(UsageError::new(NEEDS_LENS));
@@ -103,8 +106,8 @@ pub fn default_near(cloud: &Cloud) -> f64 {
     (NEAR * cloud.diagonal()).max(f64::MIN_POSITIVE)
 }
 
-/// The camera, and the complete options, for a prepared cloud. `camera` is the one of the camera file, if
-/// there is one.
+/// The camera, with the lens that is asked for, and the complete options, for a prepared cloud. `camera` is that of a
+/// file or fitted.
 ///
 /// # Errors
 /// [`UsageError`] for values that do not go with this cloud or camera; the renderer's own error if the cloud
@@ -112,13 +115,9 @@ pub fn default_near(cloud: &Cloud) -> f64 {
 pub fn against_cloud(
     arguments: &RenderArguments,
     mut options: RenderOptions,
-    camera: Option<Camera>,
+    mut camera: Camera,
     cloud: &Cloud,
 ) -> anyhow::Result<(Camera, RenderOptions)> {
-    let mut camera = match camera {
-        Some(camera) => camera,
-        None => fit(cloud, &framing(&arguments.camera, cloud), &options)?,
-    };
     camera.near = arguments.camera.near.unwrap_or(camera.near);
     let centre = cloud.bounds().map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
     apply_lens(&arguments.camera, &mut camera, centre)?;
@@ -137,11 +136,12 @@ pub fn up(arguments: &CameraArguments, cloud: &Cloud) -> Up {
 }
 
 /// From where a fitted camera looks.
-fn framing(arguments: &CameraArguments, cloud: &Cloud) -> Framing {
+pub fn framing(arguments: &CameraArguments, cloud: &Cloud) -> Framing {
     let [width, height] = arguments.size.unwrap_or(DEFAULT_SIZE);
-    let ViewDirection { azimuth, elevation } = arguments.view.unwrap_or(DEFAULT_VIEW);
+    let view = arguments.ortho.flatten().or(arguments.view);
+    let ViewDirection { azimuth, elevation } = view.unwrap_or(DEFAULT_VIEW);
     let up = up(arguments, cloud);
-    Framing { width, height, up, azimuth, elevation, orthographic: arguments.ortho }
+    Framing { width, height, up, azimuth, elevation, orthographic: arguments.ortho.is_some() }
 }
 
 /// Gives the camera the lens that the options ask for. What they leave open the camera's own lens decides;
@@ -197,6 +197,7 @@ fn window(arguments: &SampleArguments, width: u32, height: u32) -> Result<Option
 mod tests {
     use super::*;
     use crate::arguments::{Arguments, Command};
+    use crate::cameras::Fitted;
     use clap::Parser;
     use glam::DMat4;
     use splat_core::Shading;
@@ -228,7 +229,9 @@ mod tests {
 
     fn resolved(line: &str, cloud: &Cloud) -> anyhow::Result<(Camera, RenderOptions)> {
         let arguments = arguments(line);
-        against_cloud(&arguments, options(&arguments)?, None, cloud)
+        let options = options(&arguments)?;
+        let camera = Fitted::new(&arguments, cloud, &options)?.camera(0);
+        against_cloud(&arguments, options, camera, cloud)
     }
 
     #[test]
@@ -264,6 +267,7 @@ mod tests {
             "--coverage opaque --wsat 1",
             "--resolve over --thickness 1",
             "--resolve over --coverage soft",
+            "--ortho top --view front",
             "--spp 0",
             "--spp 8 --samples 4:9",
             "--spp 2000 --pattern poisson",
@@ -312,7 +316,7 @@ mod tests {
         let lens_of = |line: &str, lens| {
             let arguments = arguments(&format!("--camera c.json {line}"));
             let options = options(&arguments).unwrap();
-            against_cloud(&arguments, options, Some(camera(lens)), &cloud).map(|(camera, _)| camera.lens())
+            against_cloud(&arguments, options, camera(lens), &cloud).map(|(camera, _)| camera.lens())
         };
         assert_eq!(lens_of("", Some(own)).unwrap(), Some(own));
         assert_eq!(lens_of("--focus 4", Some(own)).unwrap(), Some(Lens { focus: 4.0, ..own }));

@@ -99,21 +99,24 @@ impl Report {
             peak_bytes: peak_bytes(),
         }
     }
+}
 
-    /// Writes the report to a file, or to stdout if the path is `-`.
-    ///
-    /// # Errors
-    /// What the operating system says.
-    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let text = serde_json::to_string_pretty(self)? + "\n";
-        if is_stdout(path) {
-            return Ok(console::data(&text)?);
-        }
-        let mut file = AtomicFile::create(path)?;
-        file.write_all(text.as_bytes())?;
-        file.commit()?;
-        Ok(())
+/// Writes the report of a picture, or the list of those of several, to a file, or to stdout if the path is `-`.
+///
+/// # Errors
+/// What the operating system says.
+pub fn write(reports: &[Report], path: &Path) -> anyhow::Result<()> {
+    let text = match reports {
+        [report] => serde_json::to_string_pretty(report)?,
+        _ => serde_json::to_string_pretty(reports)?,
+    } + "\n";
+    if is_stdout(path) {
+        return Ok(console::data(&text)?);
     }
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(text.as_bytes())?;
+    file.commit()?;
+    Ok(())
 }
 
 /// Whether a path stands for stdout.

@@ -110,19 +110,27 @@ pub struct ViewDirection {
     pub elevation: f64,
 }
 
+/// `--ortho`: one of the six faces of the cloud's box.
+pub fn face(text: &str) -> Result<ViewDirection, String> {
+    let [azimuth, elevation] = match text {
+        "front" => [0.0, 0.0],
+        "right" => [90.0, 0.0],
+        "back" => [180.0, 0.0],
+        "left" => [270.0, 0.0],
+        "top" => [0.0, 90.0],
+        "bottom" => [0.0, -90.0],
+        _ => return Err("expected front, back, left, right, top or bottom".to_owned()),
+    };
+    Ok(ViewDirection { azimuth, elevation })
+}
+
 /// `--view`.
 pub fn view(text: &str) -> Result<ViewDirection, String> {
-    let angles = match text {
-        "front" => Some([0.0, 0.0]),
-        "right" => Some([90.0, 0.0]),
-        "back" => Some([180.0, 0.0]),
-        "left" => Some([270.0, 0.0]),
-        "top" => Some([0.0, 90.0]),
-        "bottom" => Some([0.0, -90.0]),
-        _ => split(text, ',').filter(|[azimuth, elevation]: &[f64; 2]| {
-            azimuth.is_finite() && (-90.0..=90.0).contains(elevation)
-        }),
-    };
+    if let Ok(face) = face(text) {
+        return Ok(face);
+    }
+    let angles = split(text, ',')
+        .filter(|[azimuth, elevation]: &[f64; 2]| azimuth.is_finite() && (-90.0..=90.0).contains(elevation));
     angles.map(|[azimuth, elevation]| ViewDirection { azimuth, elevation }).ok_or_else(|| {
         "expected front, back, left, right, top, bottom, or AZ,EL in degrees (EL from -90 to 90)".to_owned()
     })

@@ -99,6 +99,13 @@ pub enum Place {
     },
     /// A named field.
     Field(&'static str),
+    /// One of several cameras.
+    Camera {
+        /// Its name.
+        name: String,
+        /// The field, where it is one.
+        field: Option<&'static str>,
+    },
 }
 
 impl fmt::Display for Place {
@@ -109,6 +116,10 @@ impl fmt::Display for Place {
             Self::Byte(byte) => write!(f, "byte {byte}"),
             Self::Row { element, row, byte } => write!(f, "row {row} of element {element}, byte {byte}"),
             Self::Field(field) => write!(f, "field {field}"),
+            Self::Camera { name, field: None } => write!(f, "camera {}", quoted(name.as_bytes())),
+            Self::Camera { name, field: Some(field) } => {
+                write!(f, "camera {}, field {field}", quoted(name.as_bytes()))
+            }
         }
     }
 }
@@ -137,6 +148,20 @@ impl Error {
     /// An [`Error::Limit`].
     pub(crate) fn limit(path: &Path, what: impl Into<String>, limit: impl Into<String>) -> Self {
         Self::Limit { path: path.to_owned(), what: what.into(), limit: limit.into() }
+    }
+
+    /// The same error, said of one of the cameras of a file.
+    pub(crate) fn of_camera(self, name: &str) -> Self {
+        let place = |field| Place::Camera { name: name.to_owned(), field };
+        match self {
+            Self::Invalid { path, place: Place::Field(field), found, expected } => {
+                Self::Invalid { path, place: place(Some(field)), found, expected }
+            }
+            Self::Core { path, cause: splat_core::Error::Invalid { what, found, expected } } => {
+                Self::Invalid { path, place: place(Some(what)), found, expected: expected.to_owned() }
+            }
+            other => other,
+        }
     }
 
     /// An [`Error::Core`]; made for `map_err`.

@@ -70,7 +70,7 @@ impl Compression {
 /// variance.G variance.B`. `Z`, `P`, `layers`, `samples` and `variance` are always 32-bit floats. What a
 /// 16-bit float cannot hold becomes the greatest one that it can (65504), infinities too.
 ///
-/// The metadata become the attributes `software`, `worldToCamera` (the standard one, for row vectors, 32-bit
+/// The metadata become the attributes `software`, `xDensity` (pixels an inch), `worldToCamera` (the standard one, for row vectors, 32-bit
 /// floats) and, where those lose digits, `worldToCameraText` (rows listed, for column vectors), `samples` (an
 /// integer; the others are texts), `sampleRange` ("A:B", half open), `seed`, `engine`, `options`,
 /// `inputHash`; where there are positions, `positionOrigin` ("X Y Z", to be added to `P`). The same film and
@@ -162,6 +162,7 @@ fn write_channels(
 
 fn layer_attributes(film: &Film, metadata: &Metadata) -> LayerAttributes {
     let mut attributes = LayerAttributes::default().with_position(Vec2(film.window.x0, film.window.y0));
+    attributes.horizontal_density = metadata.pixels_per_inch.map(|density| density as f32);
     attributes.software_name = metadata.software.as_deref().map(text);
     let mut add = |name: &str, value: AttributeValue| _ = attributes.other.insert(text(name), value);
     if let Some(samples) = metadata.samples {

@@ -7,22 +7,27 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
-pub mod camera_json;
+pub mod cameras;
 pub mod error;
 pub mod exr_file;
 pub mod import;
+mod lines;
 pub mod mesh;
 pub mod metadata;
 pub mod picture;
 pub mod ply;
 pub mod png_file;
+pub mod points3d;
 pub mod scene_file;
 mod source;
 pub mod srgb;
 pub mod texture_file;
 
 pub use atomic::AtomicFile;
-pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
+pub use cameras::{
+    CameraDefaults, CameraSet, NamedCamera, parse_camera_json, read_camera_json, read_cameras,
+    read_cameras_with, write_camera_json, write_cameras_json,
+};
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_aov_files, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
@@ -33,5 +38,6 @@ pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::{PngDepth, write_png};
+pub use points3d::read_points3d;
 pub use scene_file::{SceneFile, parse_scene, read_scene};
 pub use texture_file::{read_pyramid, read_pyramid_from};

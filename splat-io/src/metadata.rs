@@ -20,6 +20,8 @@ pub struct Metadata {
     pub engine: Option<String>,
     /// The options, as text.
     pub options: Option<String>,
+    /// Pixels an inch of a print, across and down.
+    pub pixels_per_inch: Option<f64>,
     /// SHA-256 of the input, in hexadecimal.
     pub input_hash: Option<String>,
 }

@@ -2,7 +2,7 @@
 
 use crate::srgb::srgb8_from_linear;
 use crate::{AtomicFile, Error, Metadata};
-use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
+use png::{BitDepth, ColorType, Encoder, EncodingError, PixelDimensions, SrgbRenderingIntent, Unit};
 use splat_core::Film;
 use splat_core::srgb::encode as srgb_from_linear;
 use std::io::{BufWriter, Write};
@@ -22,8 +22,8 @@ pub enum PngDepth {
 ///
 /// Color is divided by alpha (nothing where alpha rounds to 0), clamped to [0, 1], encoded as sRGB and
 /// rounded to the nearest level, ties up. Without transparency (every alpha rounds to the highest level) the file
-/// has no alpha channel. The metadata become text chunks: software as `Software`, the options as `Comment`, all else by
-/// the name that it has in EXR files ([`crate::write_exr`]).
+/// has no alpha channel. The metadata become text chunks: software as `Software`, the options as `Comment`, pixels an
+/// inch the chunk `pHYs`, all else text by the name that it has in EXR files ([`crate::write_exr`]).
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Core`] if the film is empty or its arrays do not fit its window;
@@ -69,6 +69,10 @@ fn encode(out: impl Write, film: &Film, metadata: &Metadata, depth: PngDepth) ->
         PngDepth::Sixteen => BitDepth::Sixteen,
     });
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    encoder.set_pixel_dims(metadata.pixels_per_inch.map(|density| {
+        let per_metre = (density / 0.0254).round() as u32;
+        PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
+    }));
     for (keyword, text) in metadata.texts("Software", "Comment") {
         // A text chunk holds Latin-1 and, between its keyword and text, a zero byte.
         if text.chars().all(|c| c != '\0' && u32::from(c) < 256) {
@@ -206,12 +210,15 @@ mod tests {
         let metadata = Metadata {
             software: Some("splat 1".to_owned()),
             options: Some("--view front → ü".to_owned()),
+            pixels_per_inch: Some(300.0),
             ..Metadata::default()
         };
         let (_, info) = write(&film(&[[0.0; 4]; 3]), &metadata);
         assert_eq!(info.srgb, Some(SrgbRenderingIntent::Perceptual));
         assert_eq!(info.uncompressed_latin1_text[0].keyword, "Software");
         assert_eq!(info.uncompressed_latin1_text[0].text, "splat 1");
+        let size = info.pixel_dims.unwrap();
+        assert_eq!((size.xppu, size.yppu, size.unit), (11_811, 11_811, Unit::Meter));
         assert_eq!(info.utf8_text[0].get_text().unwrap(), "--view front → ü");
     }
 

@@ -4,7 +4,7 @@ use crate::describe;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use splat_core::{Cloud, Shapes};
-use splat_io::{Import, ImportReport, Usage, read_ply};
+use splat_io::{Import, ImportReport, Usage, read_ply, read_points3d};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -82,7 +82,9 @@ impl Summary {
     /// # Errors
     /// What the reader says.
     pub fn read(path: &Path) -> Result<Self, splat_io::Error> {
-        let Import { cloud, report } = read_ply(path)?;
+        let points = splat_io::points3d::find_points3d(path);
+        let Import { cloud, report } =
+            points.map_or_else(|| read_ply(path), |points| read_points3d(&points))?;
         Ok(Self::new(cloud, report))
     }
 

@@ -132,6 +132,7 @@ fn metadata_come_back() {
         seed: Some(u64::MAX),
         engine: Some("reference".to_owned()),
         options: Some("--exp lerp256 ü".to_owned()),
+        pixels_per_inch: Some(300.0),
         input_hash: Some("00ff".to_owned()),
     };
     let mut film = film(PixelRect::new(0, 0, 2, 2), AovSelection::ALL);
@@ -139,6 +140,7 @@ fn metadata_come_back() {
     let image = read_back(&write(&film, &metadata, &ExrOptions::default()));
     let attributes = &image.layer_data.attributes;
     assert_eq!(attributes.software_name, Some(text("splat 0.1.0")));
+    assert_eq!(attributes.horizontal_density, Some(300.0));
     let expected = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 500_000.1_f64 as f32, 2., 3., 1.];
     assert_eq!(attributes.world_to_camera, Some(expected));
     let texts = [

@@ -1,14 +1,16 @@
-//! Cameras as JSON.
+//! Our own cameras, as JSON.
 //!
-//! One object with these fields, and no others:
+//! One object with these fields, and no others, or `{"cameras": [..]}` with a list of them:
 //!
 //! | field | meaning |
 //! |---|---|
+//! | `name` | of the camera; may be absent |
 //! | `model` | "pinhole" or "orthographic" |
 //! | `width`, `height` | pixels of the full frame |
 //! | `fx`, `fy` | pinhole: focal length, in pixels |
 //! | `pixels_per_unit` | orthographic: pixels a camera unit |
 //! | `cx`, `cy` | principal point, in pixels; the first pixel's centre is at 0.5; orthographic: absent is the middle |
+//! | `k1`, `k2`, `k3`, `p1`, `p2` | pinhole: lens distortion ([`splat_core::Distortion`]); absent is 0 |
 //! | `world_to_camera` | 4 rows of 4 numbers, for column vectors: p_camera = M p_world |
 //! | `near`, `far` | range of depth, in camera units; absent or null: 1e-4 of the cloud's diagonal, and infinity |
 //! | `fstop` | f-number of a thin lens whose image plane is at 1; absent or null: no lens |
@@ -18,17 +20,16 @@
 //!
 //! Without `fstop` or `lens_radius` there is no lens, and `focus` and `blades` say nothing.
 
-use crate::error::quoted;
+use super::{CameraSet, NamedCamera, check, from_json, name_or_number, read_text};
 use crate::{AtomicFile, Error, Place};
 use glam::{DMat4, DVec2};
 use serde::{Deserialize, Deserializer, Serialize};
-use splat_core::{Camera, Lens, Projection};
-use std::fs::File;
-use std::io::{Read, Write};
+use splat_core::{Camera, Distortion, Lens, Projection};
+use std::io::Write;
 use std::path::Path;
 
-/// Greatest size of a camera file, in bytes.
-const MOST_BYTES: u64 = 1 << 20;
+/// Greatest size of the file of one camera, in MiB.
+const MOST_MEBIBYTES: u64 = 1;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -41,6 +42,8 @@ enum Model {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraJson {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
     model: Model,
     width: u32,
     height: u32,
@@ -54,6 +57,16 @@ struct CameraJson {
     cx: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    k1: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    k2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    k3: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    p1: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    p2: Option<f64>,
     world_to_camera: [[f64; 4]; 4],
     #[serde(skip_serializing_if = "Option::is_none")]
     near: Option<f64>,
@@ -70,6 +83,13 @@ struct CameraJson {
     blades: Option<u32>,
 }
 
+/// Several objects.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ListJson {
+    cameras: Vec<CameraJson>,
+}
+
 /// Tells a field that is null from one that is absent.
 fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f64>>, D::Error> {
     Option::deserialize(deserializer).map(Some)
@@ -83,18 +103,7 @@ fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f
 /// [`Error::Io`]; [`Error::Limit`] beyond 1 MiB; [`Error::Invalid`] if it is no UTF-8; otherwise as
 /// [`parse_camera_json`].
 pub fn read_camera_json(path: &Path, default_near: f64) -> Result<Camera, Error> {
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    let mut bytes = Vec::new();
-    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(Error::io(path, "read"))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::limit(path, "a camera file of more than 1 MiB", "1 MiB"));
-    }
-    let text = str::from_utf8(&bytes).map_err(|error| {
-        let place = error.valid_up_to();
-        let found = quoted(&bytes[place..]);
-        Error::invalid(path, Place::Byte(place as u64), found, "JSON, which is UTF-8 text")
-    })?;
-    parse_camera_json(text, path, default_near)
+    parse_camera_json(&read_text(path, MOST_MEBIBYTES)?, path, default_near)
 }
 
 /// Reads a camera from JSON text; `path` is its name in messages, `default_near` as in [`read_camera_json`].
@@ -104,18 +113,51 @@ pub fn read_camera_json(path: &Path, default_near: f64) -> Result<Camera, Error>
 /// [`Error::Invalid`] for fields that do not go together; [`Error::Core`] for values out of range
 /// ([`Camera::check`]).
 pub fn parse_camera_json(text: &str, path: &Path, default_near: f64) -> Result<Camera, Error> {
-    let json: CameraJson =
-        serde_json::from_str(text).map_err(|cause| Error::Json { path: path.to_owned(), cause })?;
+    let camera = camera(&from_json(text, path)?, path, default_near)?;
+    check(&camera, path)?;
+    Ok(camera)
+}
+
+/// Reads one camera as a set.
+pub(super) fn read_one(text: &str, path: &Path, near: f64) -> Result<CameraSet, Error> {
+    let json: CameraJson = from_json(text, path)?;
+    let camera = camera(&json, path, near)?;
+    check(&camera, path)?;
+    let cameras = vec![NamedCamera::new(name_or_number(json.name, 0), camera, path)?];
+    Ok(CameraSet { path: path.to_owned(), format: ONE, cameras, assumptions: Vec::new() })
+}
+
+/// The format of a file of one camera, in words.
+const ONE: &str = "camera";
+
+/// Reads a list of cameras.
+pub(super) fn read_list(text: &str, path: &Path, near: f64) -> Result<CameraSet, Error> {
+    let ListJson { cameras } = from_json(text, path)?;
+    let cameras = cameras.into_iter().enumerate().map(|(index, json)| {
+        let name = name_or_number(json.name.clone(), index);
+        let camera = camera(&json, path, near).map_err(|error| error.of_camera(&name))?;
+        NamedCamera::new(name, camera, path)
+    });
+    Ok(CameraSet {
+        path: path.to_owned(),
+        format: "list of cameras",
+        cameras: cameras.collect::<Result<_, _>>()?,
+        assumptions: Vec::new(),
+    })
+}
+
+/// The camera that an object describes, its values unchecked.
+fn camera(json: &CameraJson, path: &Path, default_near: f64) -> Result<Camera, Error> {
     let mut camera = Camera {
         width: json.width,
         height: json.height,
-        projection: projection(&json, path)?,
-        principal_point: principal_point(&json, path)?,
+        projection: projection(json, path)?,
+        principal_point: principal_point(json, path)?,
         world_to_camera: DMat4::from_cols_array_2d(&json.world_to_camera).transpose(),
         near: default_near,
         far: json.far.unwrap_or(f64::INFINITY),
         clip_planes: Vec::new(),
-        distortion: None,
+        distortion: distortion(json),
     };
     // Lengths given in scene units become those of the camera.
     let scale = camera.scale();
@@ -125,8 +167,17 @@ pub fn parse_camera_json(text: &str, path: &Path, default_near: f64) -> Result<C
     {
         lens.radius = radius * scale;
     }
-    camera.check().map_err(Error::core(path))?;
     Ok(camera)
+}
+
+/// The distortion; `None` if every coefficient is absent or 0.
+fn distortion(json: &CameraJson) -> Option<Distortion> {
+    let coefficient = |value: Option<f64>| value.unwrap_or(0.0);
+    let distortion = Distortion {
+        radial: [json.k1, json.k2, json.k3].map(coefficient),
+        tangential: [json.p1, json.p2].map(coefficient),
+    };
+    Some(distortion).filter(|distortion| *distortion != Distortion::default())
 }
 
 /// The principal point: needed by a pinhole, else the middle of the frame unless given.
@@ -162,7 +213,10 @@ fn projection(json: &CameraJson, path: &Path) -> Result<Projection, Error> {
             const WHY: &str = "the model is orthographic";
             let perspective =
                 [("fx", json.fx), ("fy", json.fy), ("fstop", json.fstop), ("lens_radius", json.lens_radius)];
+            let coefficients =
+                [("k1", json.k1), ("k2", json.k2), ("k3", json.k3), ("p1", json.p1), ("p2", json.p2)];
             unwanted(&perspective, WHY)?;
+            unwanted(&coefficients, WHY)?;
             let pixels_per_unit = needed("pixels_per_unit", json.pixels_per_unit, WHY)?;
             Ok(Projection::Orthographic { pixels_per_unit })
         }
@@ -200,7 +254,21 @@ fn lens(json: &CameraJson, path: &Path) -> Result<Option<Lens>, Error> {
 /// [`Error::Core`] if the camera is not valid; [`Error::Unsupported`] if it has clip planes, which the format
 /// cannot hold; [`Error::Io`].
 pub fn write_camera_json(path: &Path, camera: &Camera) -> Result<(), Error> {
-    camera.check().map_err(Error::core(path))?;
+    write_json(path, &json(path, None, camera)?)
+}
+
+/// Writes several cameras, with their names, as one JSON file; otherwise as [`write_camera_json`].
+///
+/// # Errors
+/// As [`write_camera_json`].
+pub fn write_cameras_json(path: &Path, cameras: &[NamedCamera]) -> Result<(), Error> {
+    let cameras = cameras.iter().map(|named| json(path, Some(named.name.clone()), &named.camera));
+    write_json(path, &ListJson { cameras: cameras.collect::<Result<_, _>>()? })
+}
+
+/// The object that describes a camera.
+fn json(path: &Path, name: Option<String>, camera: &Camera) -> Result<CameraJson, Error> {
+    check(camera, path)?;
     if !camera.clip_planes.is_empty() {
         return Err(Error::unsupported(path, "writing a camera with clip planes", "a camera without any"));
     }
@@ -210,7 +278,11 @@ pub fn write_camera_json(path: &Path, camera: &Camera) -> Result<(), Error> {
         Projection::Perspective { focal_length, .. } => (Some(focal_length), None),
         Projection::Orthographic { pixels_per_unit } => (None, Some(pixels_per_unit)),
     };
-    let json = CameraJson {
+    let distortion = camera.distortion;
+    let radial = |index: usize| distortion.map(|distortion| distortion.radial[index]);
+    let tangential = |index: usize| distortion.map(|distortion| distortion.tangential[index]);
+    Ok(CameraJson {
+        name,
         model: if camera.is_orthographic() { Model::Orthographic } else { Model::Pinhole },
         width: camera.width,
         height: camera.height,
@@ -219,6 +291,11 @@ pub fn write_camera_json(path: &Path, camera: &Camera) -> Result<(), Error> {
         pixels_per_unit,
         cx: Some(camera.principal_point.x),
         cy: Some(camera.principal_point.y),
+        k1: radial(0),
+        k2: radial(1),
+        k3: radial(2),
+        p1: tangential(0),
+        p2: tangential(1),
         world_to_camera: camera.world_to_camera.transpose().to_cols_array_2d(),
         near: Some(camera.near),
         far: finite(camera.far),
@@ -226,9 +303,12 @@ pub fn write_camera_json(path: &Path, camera: &Camera) -> Result<(), Error> {
         lens_radius: lens.map(|lens| lens.radius / camera.scale()),
         focus: lens.map(|lens| finite(lens.focus)),
         blades: lens.map(|lens| lens.blades).filter(|&blades| blades > 0),
-    };
+    })
+}
+
+fn write_json(path: &Path, json: &impl Serialize) -> Result<(), Error> {
     let mut text =
-        serde_json::to_string_pretty(&json).map_err(|cause| Error::Json { path: path.to_owned(), cause })?;
+        serde_json::to_string_pretty(json).map_err(|cause| Error::Json { path: path.to_owned(), cause })?;
     text.push('\n');
     let mut file = AtomicFile::create(path)?;
     file.write_all(text.as_bytes()).map_err(Error::io(path, "write"))?;
@@ -342,7 +422,10 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_their_place() {
         let unknown = message(&pinhole(",\n\"fov\": 40"));
-        assert!(unknown.contains("unknown field `fov`, expected one of `model`, `width`"), "{unknown}");
+        assert!(
+            unknown.contains("unknown field `fov`, expected one of `name`, `model`, `width`"),
+            "{unknown}"
+        );
         assert!(unknown.contains("line 3 column"), "{unknown}");
         assert!(message(&pinhole(r#", "cx": 1"#)).contains("duplicate field `cx`"));
         assert!(message(&pinhole("").replace("\"cx\": 320,", "")).contains("cx: found nothing"));
