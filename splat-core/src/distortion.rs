@@ -18,6 +18,11 @@ const RESIDUAL: f64 = 1.0 / 512.0;
 const STEPS: usize = 32;
 const HALVINGS: usize = 10;
 
+/// A sample is found by so many steps with the slope at its pixel's middle, if the residual, in pixels, is below this before
+/// the last one: each divides it by a thousand where pixels are small. Else Newton's method starts anew.
+const CHORDS: usize = 3;
+const CHORD_RESIDUAL: f64 = 1.0 / 1_048_576.0;
+
 /// Steps of the search for the radius of what is seen: 512 are enough for any real lens.
 const RADIUS_STEPS: usize = 4096;
 
@@ -28,6 +33,7 @@ impl Distortion {
     }
 
     /// Where an ideal point is seen, both in tan units.
+    #[inline(always)]
     pub fn apply(&self, ideal: DVec2) -> DVec2 {
         let [p1, p2] = self.tangential;
         let r2 = ideal.length_squared();
@@ -36,6 +42,7 @@ impl Distortion {
     }
 
     /// 1 + k1 r2 + k2 r2^2 + k3 r2^3.
+    #[inline(always)]
     fn factor(&self, r2: f64) -> f64 {
         let [k1, k2, k3] = self.radial;
         1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -88,6 +95,7 @@ impl Distortion {
 pub struct FilmMap {
     distortion: Distortion,
     scale: DVec2,
+    inverse_scale: DVec2,
     principal_point: DVec2,
     /// Radius of the disc, in tan units; no larger than the frame needs.
     radius: f64,
@@ -105,6 +113,7 @@ impl FilmMap {
         let mut map = Self {
             distortion,
             scale: camera.pixel_scale(),
+            inverse_scale: camera.pixel_scale().recip(),
             principal_point: camera.principal_point,
             radius: 0.0,
             film_radius: 0.0,
@@ -164,7 +173,7 @@ impl FilmMap {
     /// How far [`Self::film`] may be from its tangent at `ideal`, per axis, at places around it at most `reach` pixels away,
     /// per axis: half of the greatest second derivative times the squared distance.
     pub fn bend(&self, ideal: DVec2, reach: DVec2) -> DVec2 {
-        let distance = (reach / self.scale).length();
+        let distance = (reach * self.inverse_scale).length();
         let curvature = self.distortion.curvature(self.tangents(ideal).length() + distance);
         self.scale * (0.5 * curvature * distance * distance)
     }
@@ -189,15 +198,13 @@ impl FilmMap {
 
     /// What a pixel of the film sees; `None` if its middle sees nothing, and so all of it.
     pub fn pixel(&self, x: i32, y: i32) -> Option<PixelView<'_>> {
-        let place = DVec2::new(x.into(), y.into());
-        let film = self.tangents(place + 0.5);
+        let film = self.tangents(DVec2::new(x.into(), y.into()) + 0.5);
         let ideal = self.solve(film, film)?;
         let corner = self.pixels(ideal).floor();
         // So that the distance from any splat's pixel is an integer.
         let fits = corner.abs().max_element() < f64::from(1 << 30);
         fits.then(|| PixelView {
             map: self,
-            place,
             corner: [corner.x as i32, corner.y as i32],
             film,
             ideal,
@@ -243,7 +250,7 @@ impl FilmMap {
 
     /// Tan units from pixels.
     fn tangents(&self, pixels: DVec2) -> DVec2 {
-        (pixels - self.principal_point) / self.scale
+        (pixels - self.principal_point) * self.inverse_scale
     }
 
     /// Pixels from tan units.
@@ -278,7 +285,6 @@ fn seen_radius(distortion: &Distortion, farthest: f64) -> f64 {
 #[derive(Debug, Clone, Copy)]
 pub struct PixelView<'a> {
     map: &'a FilmMap,
-    place: DVec2,
     /// The ideal pixel from whose corner its samples are counted: that in which its middle lies.
     pub corner: [i32; 2],
     /// Its middle, on the film and ideal, in tan units.
@@ -294,19 +300,63 @@ impl PixelView<'_> {
         self.map.pixels(self.ideal)
     }
 
-    /// The ideal place of a sample, relative to [`Self::corner`] as the film's is to the pixel's corner. Not a number if it
-    /// sees nothing.
-    pub fn sample(&self, jitter: [f32; 2]) -> [f32; 2] {
-        const NOWHERE: [f32; 2] = [f32::NAN; 2];
+    /// The ideal places of samples (an array for x, one for y), relative to [`Self::corner`] as those on the film are to the
+    /// pixel's corner. Not numbers where nothing is seen.
+    ///
+    /// Plain loops over lanes: compilers take as many at once as the processor can, and the bits are the same.
+    #[inline(always)]
+    pub fn samples<const N: usize>(&self, jitter: &[[f32; N]; 2]) -> [[f32; N]; 2] {
         let map = self.map;
-        let film = map.tangents(self.place + DVec2::from(jitter.map(f64::from)));
-        let start = self.ideal + self.inverse * (film - self.film);
-        let Some(ideal) = map.solve(film, start) else { return NOWHERE };
-        let [x, y] = self.corner.map(f64::from);
-        let offset = map.pixels(ideal) - DVec2::new(x, y);
-        // Beyond only where pixels are far from square.
-        let fits = offset.abs().max_element() <= map.max_jitter();
-        if fits { [offset.x as f32, offset.y as f32] } else { NOWHERE }
+        let [inverse_x, inverse_y] = [self.inverse.x_axis, self.inverse.y_axis];
+        let [mut film, mut start] = [[[0.0; N]; 2]; 2];
+        for lane in 0..N {
+            let from_middle = [0, 1].map(|i| (f64::from(jitter[i][lane]) - 0.5) * map.inverse_scale[i]);
+            for i in 0..2 {
+                film[i][lane] = self.film[i] + from_middle[i];
+                start[i][lane] =
+                    self.ideal[i] + (inverse_x[i] * from_middle[0] + inverse_y[i] * from_middle[1]);
+            }
+        }
+        let mut ideal = start;
+        let mut residual = [[0.0; N]; 2];
+        for _ in 0..CHORDS {
+            for lane in 0..N {
+                let seen = map.distortion.apply(DVec2::new(ideal[0][lane], ideal[1][lane]));
+                let left = [film[0][lane] - seen.x, film[1][lane] - seen.y];
+                for i in 0..2 {
+                    ideal[i][lane] += inverse_x[i] * left[0] + inverse_y[i] * left[1];
+                    residual[i][lane] = left[i];
+                }
+            }
+        }
+        let is_close = |lane: usize, i: usize| (residual[i][lane] * map.scale[i]).abs() < CHORD_RESIDUAL;
+        for lane in 0..N {
+            let done = is_close(lane, 0) && is_close(lane, 1);
+            if !done {
+                let [film, start] = [film, start].map(|place| DVec2::new(place[0][lane], place[1][lane]));
+                [ideal[0][lane], ideal[1][lane]] = map.solve(film, start).unwrap_or(DVec2::NAN).to_array();
+            }
+        }
+        let shift = [0, 1].map(|i| map.principal_point[i] - f64::from(self.corner[i]));
+        let (most, squared_radius) = (map.max_jitter(), map.radius * map.radius);
+        let mut found = [[f32::NAN; N]; 2];
+        for lane in 0..N {
+            let [x, y] = [ideal[0][lane], ideal[1][lane]];
+            let offset = [x * map.scale.x + shift[0], y * map.scale.y + shift[1]];
+            // Beyond `most` only where pixels are far from square.
+            let fits = (offset[0].abs() <= most) & (offset[1].abs() <= most);
+            let is_seen = (x * x + y * y <= squared_radius) & fits;
+            for i in 0..2 {
+                found[i][lane] = if is_seen { offset[i] as f32 } else { f32::NAN };
+            }
+        }
+        found
+    }
+
+    /// [`Self::samples`] of one.
+    pub fn sample(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [[x], [y]] = self.samples(&[[x], [y]]);
+        [x, y]
     }
 }
 

@@ -68,7 +68,7 @@ impl<'a> SplatBySplat<'a> {
             filter_radius: self.frame.view.filter_radius as f32,
         };
         let candidates = self.frame.set_up.splats[rank].bounds.intersect(&region);
-        self.distorted.fill(&self.frame.rasterizer, &candidates);
+        self.distorted.fill(&self.frame.rasterizer, &candidates, self.level);
         let Self { records, places, distorted, cells, .. } = self;
         records.clear(self.samples.groups(), false, usize::MAX);
         let ranks = &[rank as u32];

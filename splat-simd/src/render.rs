@@ -279,7 +279,7 @@ impl<'a> Picture<'a> {
         let frame = [self.camera.width, self.camera.height];
         let mut film = pixels.empty_film(frame, *region, self.samples.samples());
         let start = Instant::now();
-        worker.distorted.fill(&self.frame.rasterizer, region);
+        worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let mut statistics = Statistics { raster: start.elapsed(), ..Statistics::default() };
         self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics);
         Tile { film, statistics }
@@ -290,7 +290,7 @@ impl<'a> Picture<'a> {
         let start = Instant::now();
         worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
         worker.records.forget();
-        worker.distorted.fill(&self.frame.rasterizer, region);
+        worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let lattice = self.lattice_for(region, ranks);
         let tests = self.rasterize(worker, region, ranks, lattice);
         let fragments = worker.records.fragments;

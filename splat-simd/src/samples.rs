@@ -1,9 +1,10 @@
 //! The samples of a frame in the order in which lanes want them.
 
 use crate::evaluate::LaneLimits;
-use crate::lanes::{Eight, LANES, Lanes};
+use crate::lanes::{Eight, Kernel, LANES, Lanes, Level};
 use crate::places::{PLACES, pixel_of, place_of};
 use splat_core::PixelRect;
+use splat_core::distortion::FilmMap;
 use splat_core::raster::Rasterizer;
 use splat_core::sampling::PATTERNS;
 
@@ -115,10 +116,16 @@ pub struct DistortedSamples {
 
 impl DistortedSamples {
     /// Takes those of the pixels of `region`, which lies within one tile; the others are left undefined.
-    pub fn fill(&mut self, rasterizer: &Rasterizer, region: &PixelRect) {
+    pub fn fill(&mut self, rasterizer: &Rasterizer, region: &PixelRect, level: Level) {
         // There may be some of a picture before.
         self.corners.clear();
-        let Some(map) = rasterizer.distortion() else { return };
+        if let Some(map) = rasterizer.distortion() {
+            level.run(FillJob { samples: self, map, rasterizer, region });
+        }
+    }
+
+    #[inline(always)]
+    fn fill_by(&mut self, map: &FilmMap, rasterizer: &Rasterizer, region: &PixelRect) {
         let range = rasterizer.range();
         let groups = range.len().div_ceil(LANES);
         self.corners.resize(PLACES, [0; 2]);
@@ -132,11 +139,12 @@ impl DistortedSamples {
                 for (group, film) in film.chunks(LANES).enumerate() {
                     let mut lanes = [[f32::NAN; LANES]; 2];
                     for (lane, &film) in film.iter().enumerate() {
-                        if let Some(pixel) = pixel {
-                            [lanes[0][lane], lanes[1][lane]] = pixel.sample(film);
-                        }
+                        [lanes[0][lane], lanes[1][lane]] = film;
                     }
-                    self.jitter[group * PLACES + place] = lanes;
+                    self.jitter[group * PLACES + place] = match &pixel {
+                        Some(pixel) => pixel.samples(&lanes),
+                        None => [[f32::NAN; LANES]; 2],
+                    };
                 }
             }
         }
@@ -152,6 +160,23 @@ impl DistortedSamples {
     pub fn of(&self, group: usize, place: u16) -> ([i32; 2], &[Eight; 2]) {
         let place = usize::from(place);
         (self.corners[place], &self.jitter[group * PLACES + place])
+    }
+}
+
+/// [`DistortedSamples::fill`] with the instructions of a level.
+struct FillJob<'a> {
+    samples: &'a mut DistortedSamples,
+    map: &'a FilmMap,
+    rasterizer: &'a Rasterizer,
+    region: &'a PixelRect,
+}
+
+impl Kernel for FillJob<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.samples.fill_by(self.map, self.rasterizer, self.region);
     }
 }
 
