@@ -112,7 +112,9 @@ impl Rasterizer {
         region: &PixelRect,
         sink: &mut impl FnMut(SamplePlace, Fragment),
     ) -> u64 {
-        self.rasterize_at(&self.positions(region), splat, rank, region, sink)
+        // A row at a time: nothing says how large the region is.
+        let rows = (region.y0..region.y1).map(|y| PixelRect { y0: y, y1: y + 1, ..*region });
+        rows.map(|row| self.rasterize_at(&self.positions(&row), splat, rank, &row, sink)).sum()
     }
 
     /// [`Self::rasterize`] given the positions of the region's samples (and perhaps others).
