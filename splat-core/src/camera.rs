@@ -33,6 +33,9 @@ pub struct Camera {
 ///
 /// An ideal point (x, y) in tan units (x/w, y/w) with r2 = x^2 + y^2 is seen at
 /// x (1 + k1 r2 + k2 r2^2 + k3 r2^3) + 2 p1 x y + p2 (r2 + 2 x^2), and for y likewise with p1 and p2 exchanged.
+///
+/// Any coefficients make a picture. Where they fold it over or stretch it more than eightfold it stays empty, as beyond
+/// the image circle of a lens: see [`crate::distortion`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Distortion {
     /// k1, k2, k3.
@@ -170,8 +173,16 @@ impl Camera {
             let expected = "a matrix whose upper left 3x3 part can be inverted";
             return Err(Error::invalid("camera world_to_camera", self.world_to_camera, expected));
         }
-        if self.distortion.is_some() {
-            return Err(Error::invalid("camera distortion", "one", "none yet"));
+        if let Some(Distortion { radial: [k1, k2, k3], tangential: [p1, p2] }) = self.distortion {
+            let finite = [k1, k2, k3, p1, p2].into_iter().all(f64::is_finite);
+            if self.is_orthographic() || !finite {
+                let found = format!("k1, k2, k3 = {k1}, {k2}, {k3}; p1, p2 = {p1}, {p2}");
+                return Err(Error::invalid(
+                    "camera distortion",
+                    found,
+                    "finite numbers, of a perspective camera",
+                ));
+            }
         }
         if self.clip_planes.iter().any(|plane| !plane.is_finite()) {
             return Err(Error::invalid("clip plane", "a value that is not finite", "finite numbers"));

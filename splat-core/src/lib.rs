@@ -4,6 +4,7 @@
 
 pub mod camera;
 pub mod cloud;
+pub mod distortion;
 pub mod error;
 pub mod evaluate;
 pub mod film;

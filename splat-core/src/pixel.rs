@@ -216,7 +216,8 @@ impl<'a> PixelResolver<'a> {
     /// The world position of the point at depth `w` on a sample's ray.
     fn world_position(&self, place: SamplePlace, w: f64, samples: &SampleTable) -> DVec3 {
         let jitter = samples.jitter(place.x, place.y)[place.sample];
-        let pixel = DVec2::new(f64::from(place.x), f64::from(place.y)) + DVec2::from(jitter.map(f64::from));
+        let ([x, y], jitter) = self.view.ideal_sample(place.x, place.y, jitter);
+        let pixel = DVec2::new(f64::from(x), f64::from(y)) + DVec2::from(jitter.map(f64::from));
         let screen = (pixel - self.view.principal_point) / self.view.pixel_scale;
         let xy = match self.view.lens {
             _ if self.view.orthographic => screen,

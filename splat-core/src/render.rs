@@ -312,11 +312,12 @@ impl Picture<'_> {
         let range = rasterizer.range();
         self.buffer.clear(region.area() * range.len());
         let buffer = &mut self.buffer;
+        let positions = rasterizer.positions(region);
         let mut tests = 0;
         for &rank in ranks {
             let splat = &self.frame.set_up.splats[rank as usize];
             let candidates = splat.bounds.intersect(region);
-            tests += rasterizer.rasterize(splat, rank, &candidates, &mut |place, fragment| {
+            tests += rasterizer.rasterize_at(&positions, splat, rank, &candidates, &mut |place, fragment| {
                 buffer.push(local_sample(region, place, range.len(), range.start), fragment);
             });
             if buffer.len() > self.budget && region.area() > 1 {

@@ -6,7 +6,7 @@ use crate::places::{PLACES, PlaceList, TILE, pixel_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::render::set_up;
-use crate::samples::LaneSamples;
+use crate::samples::{DistortedSamples, LaneSamples};
 use splat_abuffer::Fragment;
 use splat_core::raster::SamplePlace;
 use splat_core::render::Frame;
@@ -24,6 +24,7 @@ struct SplatBySplat<'a> {
     level: Level,
     records: RecordBuffer,
     places: PlaceList,
+    distorted: DistortedSamples,
     cells: Vec<CellNumber>,
 }
 
@@ -36,6 +37,7 @@ impl<'a> SplatBySplat<'a> {
             level,
             records: RecordBuffer::default(),
             places: PlaceList::default(),
+            distorted: DistortedSamples::default(),
             cells: Vec::new(),
         }
     }
@@ -65,14 +67,16 @@ impl<'a> SplatBySplat<'a> {
             surfaces: &self.frame.set_up.surfaces,
             filter_radius: self.frame.view.filter_radius as f32,
         };
-        let Self { records, places, cells, .. } = self;
+        let candidates = self.frame.set_up.splats[rank].bounds.intersect(&region);
+        self.distorted.fill(&self.frame.rasterizer, &candidates, self.level);
+        let Self { records, places, distorted, cells, .. } = self;
         records.clear(self.samples.groups(), false, usize::MAX);
         let ranks = &[rank as u32];
         let tests = match (method, &self.lattice) {
             (Method::LensPoints, Some(lattice)) => {
                 self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
             }
-            _ => self.level.run(RasterJob { frame, ranks, region, records, places }),
+            _ => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
         };
         self.records.group();
         tests

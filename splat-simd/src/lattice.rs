@@ -69,9 +69,9 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice of a frame; `None` without a lens.
+    /// The lattice of a frame; `None` without a lens, and if it distorts: then no two pixels share their positions.
     pub fn new(rasterizer: &Rasterizer, view: &View) -> Option<Self> {
-        let lens = view.lens?;
+        let lens = view.lens.filter(|_| view.distortion.is_none())?;
         let range = rasterizer.range();
         let table = rasterizer.samples();
         let mut points: Vec<LensSample> = (0..PATTERNS)

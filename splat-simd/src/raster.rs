@@ -1,11 +1,11 @@
 //! From splats to fragments: the eight samples of a cell against one splat at a time.
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
-use crate::lanes::{Kernel, LANES, Lanes, prefetch};
+use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
 use crate::lattice::{Apart, CellNumber, Lattice};
 use crate::places::{PLACES, PlaceList, TILE};
 use crate::records::{Page, Record, RecordBuffer};
-use crate::samples::{GroupSamples, LaneSamples, limits};
+use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
 use splat_core::kernel::{KernelTable, Polynomials};
@@ -44,6 +44,8 @@ pub struct RasterJob<'a> {
     pub records: &'a mut RecordBuffer,
     /// Scratch.
     pub places: &'a mut PlaceList,
+    /// The positions of the region's samples, if the lens distorts.
+    pub distorted: &'a DistortedSamples,
 }
 
 impl Kernel for RasterJob<'_> {
@@ -68,6 +70,19 @@ impl Kernel for RasterJob<'_> {
 const PINHOLE: u8 = 0;
 const THIN_LENS: u8 = 1;
 const ORTHOGRAPHIC: u8 = 2;
+// The first two where the lens distorts.
+const DISTORTED_PINHOLE: u8 = 3;
+const DISTORTED_THIN_LENS: u8 = 4;
+
+/// Whether a form needs lens points.
+const fn has_lens(form: u8) -> bool {
+    matches!(form, THIN_LENS | DISTORTED_THIN_LENS)
+}
+
+/// Whether a form takes its positions from [`DistortedSamples`].
+const fn is_distorted(form: u8) -> bool {
+    matches!(form, DISTORTED_PINHOLE | DISTORTED_THIN_LENS)
+}
 
 // Which hits are taken: those of lens points on the eye's side of the splat's plane, of the others, or of all.
 const ANY_SIDE: u8 = 0;
@@ -77,16 +92,18 @@ const OTHER_SIDE: u8 = 2;
 impl RasterJob<'_> {
     #[inline(always)]
     fn with_table<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
-        match self.frame.rasterizer.form() {
-            Form::Pinhole => self.rasterize::<L, T, PINHOLE>(table),
-            Form::ThinLens => self.rasterize::<L, T, THIN_LENS>(table),
-            Form::Orthographic => self.rasterize::<L, T, ORTHOGRAPHIC>(table),
+        match (self.frame.rasterizer.form(), self.distorted.is_empty()) {
+            (Form::Pinhole, true) => self.rasterize::<L, T, PINHOLE>(table),
+            (Form::ThinLens, true) => self.rasterize::<L, T, THIN_LENS>(table),
+            (Form::Pinhole, false) => self.rasterize::<L, T, DISTORTED_PINHOLE>(table),
+            (Form::ThinLens, false) => self.rasterize::<L, T, DISTORTED_THIN_LENS>(table),
+            (Form::Orthographic, _) => self.rasterize::<L, T, ORTHOGRAPHIC>(table),
         }
     }
 
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable, const FORM: u8>(self, table: &T) -> u64 {
-        let Self { frame, ranks, region, records, places } = self;
+        let Self { frame, ranks, region, records, places, distorted } = self;
         let mut tests = 0;
         for (i, &rank) in ranks.iter().enumerate() {
             if let Some(&next) = ranks.get(i + AHEAD) {
@@ -99,10 +116,11 @@ impl RasterJob<'_> {
             let Some(page) = records.begin(rank, &frame.surfaces[rank as usize], cells) else { break };
             tests += (places.places().len() * frame.samples.samples()) as u64;
             let splat = Evaluation::<L, T>::new(&frame, splat, table);
-            if splat.splat.plain {
-                splat.rasterize::<FORM, true>(places, page);
+            // With distortion none is plain.
+            if splat.splat.plain && !is_distorted(FORM) {
+                splat.rasterize::<FORM, true>(places, distorted, page);
             } else {
-                splat.rasterize::<FORM, false>(places, page);
+                splat.rasterize::<FORM, false>(places, distorted, page);
             }
         }
         tests
@@ -201,20 +219,25 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
 
     /// Tests all samples of a list of pixels. `PLAIN` is that of the splat, here and below.
     #[inline(always)]
-    fn rasterize<const FORM: u8, const PLAIN: bool>(&self, list: &PlaceList, mut page: Page<'_>) {
+    fn rasterize<const FORM: u8, const PLAIN: bool>(
+        &self,
+        list: &PlaceList,
+        distorted: &DistortedSamples,
+        mut page: Page<'_>,
+    ) {
         let back = self.splat.back;
-        if FORM == THIN_LENS && self.splat.flips {
+        if has_lens(FORM) && self.splat.flips {
             // Once for each side: few splats stand so that the lens sees both.
             if !(self.culls && back) {
-                self.side::<FORM, PLAIN, true, SAME_SIDE>(list, &mut page, back);
+                self.side::<FORM, PLAIN, true, SAME_SIDE>(list, distorted, &mut page, back);
             }
             if back || !self.culls {
-                self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, &mut page, !back);
+                self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, distorted, &mut page, !back);
             }
-        } else if FORM == THIN_LENS && !(self.culls && back) {
-            self.side::<FORM, PLAIN, true, ANY_SIDE>(list, &mut page, back);
-        } else if FORM != THIN_LENS {
-            self.side::<FORM, PLAIN, false, ANY_SIDE>(list, &mut page, back);
+        } else if has_lens(FORM) && !(self.culls && back) {
+            self.side::<FORM, PLAIN, true, ANY_SIDE>(list, distorted, &mut page, back);
+        } else if !has_lens(FORM) {
+            self.side::<FORM, PLAIN, false, ANY_SIDE>(list, distorted, &mut page, back);
         }
         let fragments = self.weigh(page.records());
         page.close(fragments);
@@ -344,12 +367,15 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     fn side<const FORM: u8, const PLAIN: bool, const SPARSE: bool, const SIDE: u8>(
         &self,
         list: &PlaceList,
+        distorted: &DistortedSamples,
         page: &mut Page<'_>,
         back: bool,
     ) {
         let patterns = self.samples.patterns();
+        let center = [self.splat.constants.xi, self.splat.constants.yi];
         for group in 0..self.samples.groups() {
-            let source = Source { list, patterns, samples: self.samples.group(group) };
+            let samples = self.samples.group(group);
+            let source = Source { list, patterns, samples, distorted, group, center };
             let mut column = page.column(group, back, list.places().len());
             let (pairs, last) = list.places().as_chunks::<2>();
             if L::CELLS == 2 {
@@ -395,9 +421,8 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         source: &Source<'_>,
         [first, second]: [u16; 2],
     ) -> LaneHits<L> {
-        let (pattern_a, pattern_b) = (source.pattern(first), source.pattern(second));
-        let (jitter_a, jitter_b) = (source.samples.jitter(pattern_a), source.samples.jitter(pattern_b));
-        let (offset_a, offset_b) = (source.list.offset(first), source.list.offset(second));
+        let (offset_a, jitter_a) = source.position::<FORM>(first);
+        let (offset_b, jitter_b) = source.position::<FORM>(second);
         let jitter = [
             L::load_cells(&jitter_a[0], &jitter_b[0]) + self.minus_fraction[0],
             L::load_cells(&jitter_a[1], &jitter_b[1]) + self.minus_fraction[1],
@@ -407,9 +432,9 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
             L::splat_cells(offset_a[1], offset_b[1]) + jitter[1],
         ];
         match FORM {
-            PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
-            THIN_LENS => {
-                let (a, b) = (source.samples.lens(pattern_a), source.samples.lens(pattern_b));
+            PINHOLE | DISTORTED_PINHOLE => self.lane_splat.pinhole::<PLAIN>(d, &self.limits),
+            THIN_LENS | DISTORTED_THIN_LENS => {
+                let (a, b) = (source.lens(first), source.lens(second));
                 let p = [L::load_cells(&a[0], &b[0]), L::load_cells(&a[1], &b[1])];
                 self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
             }
@@ -423,6 +448,10 @@ struct Source<'a> {
     list: &'a PlaceList,
     patterns: &'a [[u8; 2]; PLACES],
     samples: &'a GroupSamples,
+    distorted: &'a DistortedSamples,
+    group: usize,
+    /// The splat's pixel.
+    center: [i32; 2],
 }
 
 impl Source<'_> {
@@ -430,6 +459,23 @@ impl Source<'_> {
     #[inline(always)]
     fn pattern(&self, place: u16) -> [u8; 2] {
         self.patterns[usize::from(place) % PLACES]
+    }
+
+    /// The lens points of a place.
+    #[inline(always)]
+    fn lens(&self, place: u16) -> &[Eight; 2] {
+        self.samples.lens(self.pattern(place))
+    }
+
+    /// The positions of a place, and from where they are counted relative to the splat's pixel.
+    #[inline(always)]
+    fn position<const FORM: u8>(&self, place: u16) -> ([f32; 2], &[Eight; 2]) {
+        if is_distorted(FORM) {
+            let ([x, y], jitter) = self.distorted.of(self.group, place);
+            ([(x - self.center[0]) as f32, (y - self.center[1]) as f32], jitter)
+        } else {
+            (self.list.offset(place), self.samples.jitter(self.pattern(place)))
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::ResolveJob;
-use crate::samples::LaneSamples;
+use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
@@ -48,6 +48,7 @@ pub struct Renderer {
 struct Worker {
     records: RecordBuffer,
     places: PlaceList,
+    distorted: DistortedSamples,
     cells: Vec<CellNumber>,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
@@ -277,7 +278,9 @@ impl<'a> Picture<'a> {
         let mut pixels = self.pixels();
         let frame = [self.camera.width, self.camera.height];
         let mut film = pixels.empty_film(frame, *region, self.samples.samples());
-        let mut statistics = Statistics::default();
+        let start = Instant::now();
+        worker.distorted.fill(&self.frame.rasterizer, region, self.level);
+        let mut statistics = Statistics { raster: start.elapsed(), ..Statistics::default() };
         self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics);
         Tile { film, statistics }
     }
@@ -287,6 +290,7 @@ impl<'a> Picture<'a> {
         let start = Instant::now();
         worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
         worker.records.forget();
+        worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let lattice = self.lattice_for(region, ranks);
         let tests = self.rasterize(worker, region, ranks, lattice);
         let fragments = worker.records.fragments;
@@ -310,10 +314,10 @@ impl<'a> Picture<'a> {
         ranks: &[u32],
         lattice: Option<&Lattice>,
     ) -> u64 {
-        let Worker { records, places, cells, .. } = worker;
+        let Worker { records, places, distorted, cells, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
         match lattice {
-            None => self.level.run(RasterJob { frame, ranks, region, records, places }),
+            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
             Some(lattice) => {
                 self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
             }

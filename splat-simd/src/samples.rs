@@ -1,8 +1,10 @@
 //! The samples of a frame in the order in which lanes want them.
 
 use crate::evaluate::LaneLimits;
-use crate::lanes::{Eight, LANES, Lanes};
-use crate::places::{PLACES, pixel_of};
+use crate::lanes::{Eight, Kernel, LANES, Lanes, Level};
+use crate::places::{PLACES, pixel_of, place_of};
+use splat_core::PixelRect;
+use splat_core::distortion::FilmMap;
 use splat_core::raster::Rasterizer;
 use splat_core::sampling::PATTERNS;
 
@@ -100,6 +102,81 @@ impl GroupSamples {
     #[inline(always)]
     pub fn lens(&self, [_, lens]: [u8; 2]) -> &[Eight; 2] {
         &self.lens[usize::from(lens) % PATTERNS]
+    }
+}
+
+/// The positions of a tile's samples where the lens distorts; else empty. Those of [`GroupSamples`] are then not used.
+#[derive(Debug, Default)]
+pub struct DistortedSamples {
+    /// For each place, the pixel of the ideal picture from whose corner its samples are counted.
+    corners: Vec<[i32; 2]>,
+    /// By group, then by place: positions relative to that. Not numbers where a lane sees nothing, or is no sample.
+    jitter: Vec<[Eight; 2]>,
+}
+
+impl DistortedSamples {
+    /// Takes those of the pixels of `region`, which lies within one tile; the others are left undefined.
+    pub fn fill(&mut self, rasterizer: &Rasterizer, region: &PixelRect, level: Level) {
+        // There may be some of a picture before.
+        self.corners.clear();
+        if let Some(map) = rasterizer.distortion() {
+            level.run(FillJob { samples: self, map, rasterizer, region });
+        }
+    }
+
+    #[inline(always)]
+    fn fill_by(&mut self, map: &FilmMap, rasterizer: &Rasterizer, region: &PixelRect) {
+        let range = rasterizer.range();
+        let groups = range.len().div_ceil(LANES);
+        self.corners.resize(PLACES, [0; 2]);
+        self.jitter.resize(groups * PLACES, [[f32::NAN; LANES]; 2]);
+        for y in region.y0..region.y1 {
+            for x in region.x0..region.x1 {
+                let place = usize::from(place_of(x, y));
+                let pixel = map.pixel(x, y);
+                self.corners[place] = pixel.map_or([x, y], |pixel| pixel.corner);
+                let film = &rasterizer.samples().jitter(x, y)[range.clone()];
+                for (group, film) in film.chunks(LANES).enumerate() {
+                    let mut lanes = [[f32::NAN; LANES]; 2];
+                    for (lane, &film) in film.iter().enumerate() {
+                        [lanes[0][lane], lanes[1][lane]] = film;
+                    }
+                    self.jitter[group * PLACES + place] = match &pixel {
+                        Some(pixel) => pixel.samples(&lanes),
+                        None => [[f32::NAN; LANES]; 2],
+                    };
+                }
+            }
+        }
+    }
+
+    /// Whether the samples lie where [`GroupSamples`] has them.
+    pub fn is_empty(&self) -> bool {
+        self.corners.is_empty()
+    }
+
+    /// Corner and position of the samples of a group in a place.
+    #[inline(always)]
+    pub fn of(&self, group: usize, place: u16) -> ([i32; 2], &[Eight; 2]) {
+        let place = usize::from(place);
+        (self.corners[place], &self.jitter[group * PLACES + place])
+    }
+}
+
+/// [`DistortedSamples::fill`] with the instructions of a level.
+struct FillJob<'a> {
+    samples: &'a mut DistortedSamples,
+    map: &'a FilmMap,
+    rasterizer: &'a Rasterizer,
+    region: &'a PixelRect,
+}
+
+impl Kernel for FillJob<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.samples.fill_by(self.map, self.rasterizer, self.region);
     }
 }
 

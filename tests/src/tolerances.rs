@@ -530,3 +530,20 @@ pub const LANES_CONSTANT: f64 = 5e-6;
 /// How far a mean by lanes may leave the range of its values, relative to the greatest of them: as for
 /// [`LANES_CONSTANT`].
 pub const LANES_RANGE: f64 = 5e-6;
+
+// ---------------------------------------------------------------------------------------------------------
+// Lens distortion
+
+/// The mean of the hits of a disc of 1.5 pixels against its centre's image, in pixels: 300 hits or more, evenly spread, say
+/// where the rim is to a thousandth of the disc; the disc's own bend moves the mean by .001.
+pub const DISTORTED_POINT: f64 = 0.01;
+
+/// The mean of what a line 5 pixels wide has in a column, 64 samples a pixel, against the line's middle, in pixels: some 200
+/// hits, the ends of the column's runs off by a part of a sample's distance of 1/8.
+pub const DISTORTED_LINE: f64 = 0.06;
+
+/// Depth of a hit, relative, per 1 + its relative change over a tan unit: roundings of 2^-24, and positions of 10^-7 pixel.
+pub const DISTORTED_DEPTH: f64 = 1e-5;
+
+/// A position of the film by way of the depth in `f32`, in pixels: 2^-24 of places 100 pixels from the axis, a few times.
+pub const DISTORTED_POSITION: f64 = 1e-4;

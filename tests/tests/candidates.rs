@@ -8,7 +8,7 @@ use glam::{DMat4, DQuat, DVec2, DVec3};
 use splat_core::evaluate::{LensPoint, Limits};
 use splat_core::raster::Rasterizer;
 use splat_core::setup::{View, VisibleSplat, camera_splat, project, set_up};
-use splat_core::{Camera, Cloud, PixelFilter, PixelRect, Projection, RenderOptions};
+use splat_core::{Camera, Cloud, Distortion, PixelFilter, PixelRect, Projection, RenderOptions};
 use splat_tests::core_scenes::{
     ellipses, hard, image_of, orthographic, pinhole, random_axes, random_unit_lens, thin_lens, tilted_axes,
 };
@@ -130,7 +130,16 @@ fn cameras() -> Vec<Camera> {
     if let Projection::Perspective { focal_length, .. } = &mut odd.projection {
         focal_length.y *= 1.7;
     }
-    cameras.push(odd);
+    cameras.push(odd.clone());
+    // Some of which the lens distorts: a barrel, a cushion, an oblong one off its axis, and one that folds the picture.
+    for (radial, tangential, camera) in [
+        ([-0.3, 0.08, 0.0], [0.01, -0.01], pinhole(WIDTH, HEIGHT, FOCAL)),
+        ([0.2, 0.0, 0.0], [0.0; 2], near(0.1, lens(0.3, 3.0))),
+        ([-0.1, 0.1, -0.03], [-0.005, 0.01], odd),
+        ([-2.0, 1.0, 0.0], [0.02, 0.0], near(0.1, lens(0.02, 0.5))),
+    ] {
+        cameras.push(Camera { distortion: Some(Distortion { radial, tangential }), ..camera });
+    }
     cameras
 }
 
@@ -200,7 +209,8 @@ fn assert_unseen(cloud: &Cloud, view: &View, options: &RenderOptions, rasterizer
     for y in view.window.y0..view.window.y1 {
         for x in view.window.x0..view.window.x1 {
             for sample in 0..options.samples as usize {
-                let d = constants.offset(x, y, samples.jitter(x, y)[sample].map(f64::from));
+                let ([px, py], jitter) = view.ideal_sample(x, y, samples.jitter(x, y)[sample]);
+                let d = constants.offset(px, py, jitter.map(f64::from));
                 let hit = match view.lens {
                     _ if view.orthographic => constants.orthographic(d, &limits),
                     None => constants.pinhole(d, &limits),
@@ -326,7 +336,8 @@ fn no_position_next_to_the_bounds_is_hit() {
                 let c = &splat.constants;
                 for ([x, y], jitter) in next_to(&splat.bounds, &view) {
                     positions += 1;
-                    let d = c.offset(x, y, jitter);
+                    let ([px, py], jitter) = view.ideal_sample(x, y, jitter);
+                    let d = c.offset(px, py, jitter);
                     let hit = match view.lens {
                         _ if view.orthographic => c.orthographic(d, &limits),
                         None => c.pinhole(d, &limits),

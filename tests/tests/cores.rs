@@ -11,8 +11,8 @@ use splat_core::raster::{Form, SamplePlace};
 use splat_core::render::Frame;
 use splat_core::setup::VisibleSplat;
 use splat_core::{
-    AovSelection, Camera, Cloud, Film, Kernel, Lens, PatternKind, PixelFilter, PixelRect, RenderOptions,
-    Shapes, TableMode,
+    AovSelection, Camera, Cloud, Distortion, Film, Kernel, Lens, PatternKind, PixelFilter, PixelRect,
+    RenderOptions, Shapes, TableMode,
 };
 use splat_simd::{Level, Method, Renderer};
 use splat_tests::hard_scenes::{Facing, Kind, Knowledge, Sheets, adversarial, moved, sheets};
@@ -289,6 +289,15 @@ fn camera() -> impl Strategy<Value = Camera> {
     )
 }
 
+/// Lenses that are sold, such as bend the picture to a barrel or a cushion by half, and such as leave parts of it empty.
+fn distortion() -> impl Strategy<Value = Distortion> {
+    let mild = (-0.1..0.1, -0.02..0.02, Just(0.0), -1e-3..1e-3, -1e-3..1e-3);
+    let strong = (-0.5..0.5, -0.2..0.2, -0.05..0.05, -0.02..0.02, -0.02..0.02);
+    let broken = (-8.0..8.0, -8.0..8.0, -8.0..8.0, -0.3..0.3, -0.3..0.3);
+    prop_oneof![2 => mild, 4 => strong, 1 => broken]
+        .prop_map(|(k1, k2, k3, p1, p2)| Distortion { radial: [k1, k2, k3], tangential: [p1, p2] })
+}
+
 /// Ways to resolve that the fast core does in lanes, mostly; any other now and then.
 fn resolve() -> impl Strategy<Value = Resolve> {
     prop_oneof![
@@ -473,6 +482,41 @@ fn hard_scenes_agree_in_a_million_pairs() {
     assert!(total.fragments >= 1_000_000, "{}", total.fragments);
     total.expect(&SORTS, 100);
     assert_eq!(total.sorts.get("Behind"), None, "a splat behind the eye was seen");
+}
+
+#[test]
+fn distorted_pictures_agree() {
+    let total = RefCell::new(Tally::default());
+    let perspective = camera().prop_filter("perspective", |camera| !camera.is_orthographic());
+    let scene = (0u64..1_000_000, perspective, distortion(), options(), knowledge());
+    check(40, 5, scene, |(seed, camera, distortion, options, known)| {
+        let camera = Camera { distortion: Some(distortion), ..camera };
+        let (cloud, kinds) = adversarial(98, seed, &camera, known);
+        let tally = check_fragments(&cloud, &camera, &options, &kinds);
+        let memory = TILE_MEMORY[seed as usize % 3];
+        check_pictures(&cloud, &camera, &options, &[1 + seed as usize % 8], &[memory, memory]);
+        // A renderer that has drawn with distortion forgets it.
+        let mut renderer = Renderer::new(1, Level::Portable).unwrap();
+        renderer.render(&cloud, &camera, &options, &mut |_| {}).unwrap();
+        let ideal = Camera { distortion: None, ..camera };
+        let fast = renderer.render(&cloud, &ideal, &options, &mut |_| {}).unwrap();
+        let reference = splat_core::render(&cloud, &ideal, &options, &mut |_| {}).unwrap();
+        assert_eq!(film_bits(&fast.film), film_bits(&reference.film));
+        total.borrow_mut().add(tally);
+    });
+    let total = total.into_inner();
+    assert!(total.fragments >= 500_000, "{}", total.fragments);
+    let sorts = [
+        "Pinhole",
+        "ThinLens",
+        "flips",
+        "outline known",
+        "outline unknown",
+        "one pixel",
+        "crop",
+        "sample range",
+    ];
+    total.expect(&sorts, 100);
 }
 
 #[test]

@@ -71,7 +71,7 @@ pub struct CameraSplat {
 pub struct VisibleSplat {
     /// What the evaluation needs.
     pub constants: SplatConstants<f32>,
-    /// The pixels in which it may be hit; never empty.
+    /// The pixels (of the film, if the lens distorts) in which it may be hit; never empty.
     pub bounds: PixelRect,
     /// An ellipse around the places within `bounds` from which it may be hit.
     pub outline: Outline,
@@ -245,7 +245,11 @@ impl Image {
     fn outline(&self, constants: &SplatConstants<f64>, depth: Extent, view: &View) -> Outline {
         let blur = view.circle_of_confusion(depth) * view.pixel_scale;
         self.ellipse.as_ref().map_or(Outline::EVERYTHING, |ellipse| {
-            Outline::new(ellipse, [constants.xf, constants.yf], blur.to_array())
+            let mut ellipse = ellipse.widened(blur.to_array());
+            if let Some(map) = &view.distortion {
+                ellipse = ellipse.on_film(constants.pixel(), map);
+            }
+            Outline::new(&ellipse, [constants.xf, constants.yf])
         })
     }
 }
@@ -264,7 +268,8 @@ fn sees_both_sides(constants: &SplatConstants<f64>, view: &View) -> bool {
 /// [`VisibleSplat::plain`].
 #[inline(always)]
 fn is_plain(constants: &SplatConstants<f64>, bounds: &PixelRect, depth: Extent, view: &View) -> bool {
-    if !constants.centred || view.orthographic {
+    // With distortion the ideal places of the candidates' pixels are nowhere listed.
+    if !constants.centred || view.orthographic || view.distortion.is_some() {
         return false;
     }
     let least;

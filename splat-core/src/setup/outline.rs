@@ -1,7 +1,9 @@
 //! The ellipse that a splat is in the picture: its box, and for whoever visits row by row its outline.
 
 use super::bounds::Extent;
+use crate::distortion::FilmMap;
 use crate::evaluate::SplatConstants;
+use glam::{DMat2, DVec2};
 
 /// Below this, 1 - (half depth / depth)^2 tells of a splat that reaches to the camera plane: no ellipse is worth its while.
 const LEAST_CLEARANCE: f64 = 1.0 / 16.0;
@@ -13,7 +15,7 @@ const MAX_REACH: f64 = 4096.0;
 ///
 /// It holds every sample position from which the splat may be hit, through any point of the lens, in `f32` as in exact
 /// arithmetic: the projection of the disc whose box are the candidates (see `setup/margin.rs`), widened by the circle
-/// of confusion.
+/// of confusion, and brought to the film if the lens distorts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outline {
     /// Its centre.
@@ -38,12 +40,11 @@ impl Outline {
         narrowing: 1.0,
     };
 
-    /// The outline of a disc whose picture is `ellipse`, widened by a circle of confusion of the radii `blur`, in pixels.
-    /// (`xf`, `yf`) is the place of the splat's centre in its pixel.
+    /// The outline of a disc whose picture, blurred, is `ellipse`. (`xf`, `yf`) is the place of the splat's centre in its
+    /// pixel.
     #[inline(always)]
-    pub(super) fn new(ellipse: &Ellipse, [xf, yf]: [f64; 2], blur: [f64; 2]) -> Self {
-        let Ellipse { center, half, sxy, determinant } = ellipse.widened(blur);
-        let [half_width, half_height] = half;
+    pub(super) fn new(ellipse: &Ellipse, [xf, yf]: [f64; 2]) -> Self {
+        let &Ellipse { center, half: [half_width, half_height], sxy, determinant } = ellipse;
         let reach = (center[0].abs() + half_width).max(center[1].abs() + half_height);
         if !(reach < MAX_REACH && half_height > 0.0 && half_width > 0.0) {
             return Self::EVERYTHING;
@@ -120,9 +121,27 @@ impl Ellipse {
         })
     }
 
-    /// An ellipse around the sum of this one and a circle of confusion of the radii `blur`, in pixels.
+    /// An ellipse around what of this one is seen on the film of a lens that distorts, relative to the same place of the
+    /// picture: its image under the distortion's tangent at its centre, widened by the bend between that and the edge.
+    pub(super) fn on_film(&self, from: DVec2, map: &FilmMap) -> Self {
+        let center = from + DVec2::from(self.center);
+        let slope = map.slope(center);
+        let [sxx, syy] = self.half.map(|half| half * half);
+        let s = DMat2::from_cols(DVec2::new(sxx, self.sxy), DVec2::new(self.sxy, syy));
+        let image = slope * s * slope.transpose();
+        let stretch = slope.determinant();
+        Self {
+            center: (map.film(center) - from).to_array(),
+            half: [image.x_axis.x.sqrt(), image.y_axis.y.sqrt()],
+            sxy: image.x_axis.y,
+            determinant: stretch * stretch * self.determinant,
+        }
+        .widened(map.bend(center, DVec2::from(self.half)).to_array())
+    }
+
+    /// An ellipse around the sum of this one and an upright one of the radii `blur`, in pixels.
     #[inline(always)]
-    fn widened(&self, blur: [f64; 2]) -> Self {
+    pub(super) fn widened(&self, blur: [f64; 2]) -> Self {
         let [bxx, byy] = blur.map(|blur| blur * blur);
         let sharp = bxx + byy == 0.0;
         if sharp {

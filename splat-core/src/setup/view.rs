@@ -2,8 +2,12 @@
 
 use super::bounds::{Extent, half_depth};
 use super::{BOX_PADDING, CameraSplat};
+use crate::distortion::FilmMap;
 use crate::{Camera, Cloud, Lens, PixelRect, RenderOptions, Shapes};
 use glam::{DMat3, DVec2, DVec3, DVec4, Vec4Swizzles};
+
+/// An empty rectangle.
+const NO_PIXELS: PixelRect = PixelRect::new(0, 0, 0, 0);
 
 /// A camera as set-up sees it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +28,8 @@ pub struct View {
     pub principal_point: DVec2,
     /// The lens, if any.
     pub lens: Option<Lens>,
+    /// The lens distortion, if any. Everything but the window and candidates is in pixels of the ideal picture.
+    pub distortion: Option<FilmMap>,
     /// Least depth, in camera units.
     pub near: f64,
     /// Greatest depth, in camera units; may be infinite.
@@ -38,6 +44,8 @@ pub struct View {
     pub filter_radius: f64,
     /// Width and height of the full frame, in pixels.
     pub frame: [u32; 2],
+    /// A box around what the full frame shows, in pixels; without distortion the frame itself.
+    pub seen: [Extent; 2],
     /// The pixels to render.
     pub window: PixelRect,
     /// How the depth grows in the world's directions.
@@ -52,6 +60,9 @@ impl View {
         let frame = PixelRect::new(0, 0, camera.width as i32, camera.height as i32);
         // A plane n.p + d over world points is n'.q + d' over camera points q = M p, (n', d') = M^-T (n, d).
         let to_camera = camera.world_to_camera.inverse().transpose();
+        let filter_radius = options.filter.radius();
+        let distortion = FilmMap::new(camera, filter_radius);
+        let seen = [camera.width, camera.height].map(|side| Extent { min: 0.0, max: f64::from(side) });
         Self {
             eye: camera.eye(),
             linear,
@@ -61,13 +72,15 @@ impl View {
             pixel_scale: camera.pixel_scale(),
             principal_point: camera.principal_point,
             lens: camera.lens(),
+            distortion,
             near: camera.near,
             far: camera.far,
             cutoff: options.cutoff,
             radius: options.cutoff.sqrt(),
             kernel_integral: options.kernel.integral(options.cutoff),
-            filter_radius: options.filter.radius(),
+            filter_radius,
             frame: [camera.width, camera.height],
+            seen: distortion.map_or(seen, |map| map.seen()),
             window: options.window.map_or(frame, |window| window.intersect(&frame)),
             depth_gradient: linear.row(2),
             clip_planes: camera.clip_planes.iter().map(|&plane| to_camera * plane).collect(),
@@ -76,7 +89,18 @@ impl View {
 
     /// The largest coordinate of a sample relative to its pixel's corner, in pixels.
     pub fn max_jitter(&self) -> f64 {
-        self.filter_radius + 0.5
+        self.distortion.map_or(self.filter_radius + 0.5, |map| map.max_jitter())
+    }
+
+    /// Where a sample of a pixel looks: the pixel of the ideal picture from whose corner it is counted, and its place from
+    /// there. `jitter` is its place on the film. Not a number if it sees nothing.
+    pub fn ideal_sample(&self, x: i32, y: i32, jitter: [f32; 2]) -> ([i32; 2], [f32; 2]) {
+        match &self.distortion {
+            None => ([x, y], jitter),
+            Some(map) => {
+                map.pixel(x, y).map_or(([x, y], [f32::NAN; 2]), |pixel| (pixel.corner, pixel.sample(jitter)))
+            }
+        }
     }
 
     /// The near plane that boxes are clipped at: a little in front, since a hit's depth is rounded.
@@ -144,11 +168,11 @@ impl View {
         let room = self.filter_radius + 1.0;
         let farthest =
             |axis: usize, min: f64, max: f64| (min - from[axis]).abs().max((max - from[axis]).abs());
-        let frame = self.frame.map(f64::from);
         Reach {
             of_splat: [0, 1].map(|axis| farthest(axis, screen[axis].min, screen[axis].max)),
             in_frame: [0, 1].map(|axis| {
-                farthest(axis, screen[axis].min.max(0.0) - room, screen[axis].max.min(frame[axis]) + room)
+                let Extent { min, max } = self.seen[axis];
+                farthest(axis, screen[axis].min.max(min) - room, screen[axis].max.min(max) + room)
             }),
         }
     }
@@ -156,6 +180,12 @@ impl View {
     /// The pixels of the window of which a sample may fall into a box (in pixels). Pixel i's samples lie within the
     /// filter's radius of i + 1/2.
     pub(super) fn pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
+        let Some(map) = &self.distortion else { return self.film_pixels_that_reach(screen) };
+        map.film_box(screen).map_or(NO_PIXELS, |film| self.film_pixels_that_reach(&film))
+    }
+
+    /// The same for a box of the film.
+    fn film_pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let room = self.filter_radius + BOX_PADDING;
         // Integers saturate, and the window is far smaller than their range.
         let first = |extent: Extent| floor(room + 0.5 - extent.min).saturating_neg();

@@ -112,7 +112,7 @@ impl<'a> SplatShader<'a> {
     /// The colours of a splat as a whole: at its reference point, averaged over a pixel there.
     pub(crate) fn whole(&self, index: usize, splat: &CameraSplat, exact: &SplatConstants<f64>) -> Shaded {
         let prepared = self.prepare(index, splat, exact);
-        self.shaded(&prepared, &self.sight_at(&prepared, DVec2::ZERO, exact.pixel()))
+        self.shaded(&prepared, &self.sight_at(&prepared, exact.pixel()))
     }
 
     /// The colours of a splat in the pixel (x, y).
@@ -123,10 +123,12 @@ impl<'a> SplatShader<'a> {
     /// What is seen of a splat in the pixel (x, y).
     pub fn sight(&self, splat: &ShadedSplat, x: i32, y: i32) -> Sight {
         if splat.is_whole {
-            return self.sight_at(splat, DVec2::ZERO, splat.exact.pixel());
+            return self.sight_at(splat, splat.exact.pixel());
         }
-        let pixel = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        self.sight_at(splat, pixel - splat.exact.pixel(), pixel)
+        let film = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        // A pixel whose middle sees nothing has no fragments.
+        let seen = self.view.distortion.as_ref().and_then(|map| map.pixel(x, y));
+        self.sight_at(splat, seen.map_or(film, |seen| seen.middle()))
     }
 
     fn prepare(&self, index: usize, splat: &CameraSplat, exact: &SplatConstants<f64>) -> ShadedSplat {
@@ -163,12 +165,14 @@ impl<'a> SplatShader<'a> {
         }
     }
 
-    fn sight_at(&self, splat: &ShadedSplat, offset: DVec2, pixel: DVec2) -> Sight {
+    /// What a pixel sees of a splat, its middle being at this place of the ideal picture.
+    fn sight_at(&self, splat: &ShadedSplat, pixel: DVec2) -> Sight {
         let Material { environment, shader, .. } = self.material(splat.index);
-        let point = splat.surface_point(offset);
+        let next = self.view.distortion.map_or(DMat2::IDENTITY, |map| map.next_pixels(pixel));
+        let point = splat.surface_point(pixel - splat.exact.pixel(), next);
         let ray = (environment.is_some() || shader.is_some()).then(|| RayDifferential {
             ray: self.ray(pixel),
-            next: [self.ray(pixel + DVec2::X), self.ray(pixel + DVec2::Y)],
+            next: [self.ray(pixel + next.x_axis), self.ray(pixel + next.y_axis)],
         });
         let surroundings = environment.as_ref().zip(ray.as_ref()).map(|(environment, ray)| {
             environment.direction(point.space.point, splat.normal, splat.splat.back, ray)
@@ -211,7 +215,7 @@ impl<'a> SplatShader<'a> {
         finished_color(color, self.options)
     }
 
-    /// The ray through a place of the picture and the middle of the lens, in the world.
+    /// The ray through a place of the ideal picture and the middle of the lens, in the world.
     fn ray(&self, pixel: DVec2) -> Ray {
         let view = self.view;
         let screen = (pixel - view.principal_point) / view.pixel_scale;
@@ -225,18 +229,18 @@ impl<'a> SplatShader<'a> {
 }
 
 impl ShadedSplat {
-    /// What a pixel sees of the splat, given the offset of its centre from the splat's.
+    /// What a pixel sees of the splat, given the offset of its centre from the splat's and those of the next pixels from it.
     ///
     /// The derivative of the homography gives the pixel's footprint in (u, v), a Gaussian. Through a lens it is as much larger
     /// as the circle of confusion. Of that the splat, itself a Gaussian, leaves only what lies on it: their product. So a
     /// lookup never strays beyond the splat, and one that is smaller than a pixel is looked up as a whole.
-    fn surface_point(&self, offset: DVec2) -> SurfacePoint {
+    fn surface_point(&self, offset: DVec2, next: DMat2) -> SurfacePoint {
         let c = &self.exact;
         let g = 1.0 + DVec2::from(c.h).dot(offset);
         let (place, axes) = if g >= LEAST_G {
             let uv = DVec2::from(c.reference) + DVec2::new(c.a1 * offset.y, DVec2::from(c.b).dot(offset)) / g;
             let jacobian = PixelDerivatives::of_splat(&self.constants, offset.as_vec2().to_array(), None);
-            on_the_splat(uv, &jacobian, self.variance)
+            on_the_splat(uv, DMat2::from_cols(jacobian.x, jacobian.y) * next, self.variance)
         } else {
             (DVec2::ZERO, [DVec2::X / KERNEL_VARIANCE.sqrt(), DVec2::Y / KERNEL_VARIANCE.sqrt()])
         };
@@ -253,11 +257,9 @@ impl ShadedSplat {
     }
 }
 
-/// The product of a pixel's Gaussian around `uv`, of covariance S = `variance` J J^T, and the splat's own (mean 0,
+/// The product of a pixel's Gaussian around `uv`, of covariance S = `variance` `j` `j`^T, and the splat's own (mean 0,
 /// covariance 1): its mean (S + 1)^-1 uv, and semi-axes of an ellipse whose lookup has its covariance S (S + 1)^-1.
-fn on_the_splat(uv: DVec2, jacobian: &PixelDerivatives, variance: f64) -> (DVec2, [DVec2; 2]) {
-    let PixelDerivatives { x, y } = jacobian;
-    let j = DMat2::from_cols(*x, *y);
+fn on_the_splat(uv: DVec2, j: DMat2, variance: f64) -> (DVec2, [DVec2; 2]) {
     let s = j * j.transpose() * variance;
     let shrink = (s + DMat2::IDENTITY).inverse();
     let covariance = s * shrink * (1.0 / KERNEL_VARIANCE);

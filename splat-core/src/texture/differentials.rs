@@ -4,11 +4,15 @@
 //! In `f64` and in world space, since there is one ray a pixel. No function panics, whatever its arguments.
 
 use super::footprint::{PixelDerivatives, SINGULAR, bounded};
+use crate::distortion::FilmMap;
 use crate::{Camera, Projection};
 use glam::{DVec2, DVec3};
 
 /// Where |n.d| is smaller than this (n and d of unit length) a ray grazes the surface.
 const GRAZING: f64 = 1e-8;
+
+/// How far, in pixels, a ray may start outside of the frame of a camera whose lens distorts: a wide filter, and a pixel more.
+const ROOM: f64 = 3.0;
 
 /// A ray in world space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,9 +69,17 @@ impl Ray {
     /// The camera's ray of a place of the picture, in pixels, through the point `on_lens` of the unit disc,
     /// which only matters with a thin lens: a ray goes through P(w) = p + w (s - p/focus), notes 3.4.
     ///
-    /// Pinhole rays start at the eye, those of a lens in its plane w = 0, and so do orthographic ones.
+    /// Pinhole rays start at the eye, those of a lens in its plane w = 0, and so do orthographic ones. A place that sees
+    /// nothing, since the lens distorts too much there, has a ray of direction zero.
     pub fn from_camera(camera: &Camera, pixel: DVec2, on_lens: DVec2) -> Self {
-        let screen = (pixel - camera.principal_point) / camera.pixel_scale();
+        let ideal = match FilmMap::new(camera, ROOM) {
+            None => pixel,
+            Some(map) => match map.ideal(pixel) {
+                None => return Self::new(camera.eye(), DVec3::ZERO),
+                Some(ideal) => ideal,
+            },
+        };
+        let screen = (ideal - camera.principal_point) / camera.pixel_scale();
         let (origin, direction) = match camera.projection {
             Projection::Orthographic { .. } => (screen.extend(0.0), DVec3::Z),
             Projection::Perspective { lens: None, .. } => (DVec3::ZERO, screen.extend(1.0)),
