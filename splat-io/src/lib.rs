@@ -20,6 +20,7 @@ pub mod scene_file;
 mod source;
 pub mod srgb;
 pub mod texture_file;
+pub mod trained;
 
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
@@ -35,3 +36,4 @@ pub use ply::{
 pub use png_file::write_png;
 pub use scene_file::{SceneFile, parse_scene, read_scene};
 pub use texture_file::{read_pyramid, read_pyramid_from};
+pub use trained::{read_splat, read_splat_from, read_spz, read_spz_from, read_trained, write_splat};
