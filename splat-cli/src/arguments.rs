@@ -27,7 +27,7 @@ pub struct Arguments {
 pub enum Command {
     /// Render clouds and meshes to a picture
     Render(Box<RenderArguments>),
-    /// Make a cloud (.ply) from meshes and clouds
+    /// Make a cloud (.ply, .splat) from meshes and clouds
     ///
     /// Meshes are covered evenly with surfels: an OBJ file, and a PLY file that has faces (which render takes for the cloud
     /// of its vertices). Each surfel has an area, a normal, axes and, where the mesh has them, colour and texture
@@ -42,10 +42,10 @@ pub enum Command {
 /// `splat convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Meshes (.obj, or .ply with faces) and clouds (.ply); several become one cloud
+    /// Meshes (.obj, or .ply with faces) and clouds (.ply, .splat, .spz); several become one cloud
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// The cloud: .ply
+    /// The cloud: .ply, or .splat for viewers of trained splats
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Surfels on each mesh
@@ -68,7 +68,7 @@ pub const DEFAULT_POINTS: usize = 200_000;
 /// `splat info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
-    /// A cloud (.ply), a mesh (.obj) or a camera (.json)
+    /// A cloud (.ply, .splat, .spz), a mesh (.obj) or a camera (.json)
     pub file: PathBuf,
     /// Write JSON
     #[arg(long)]
@@ -101,7 +101,7 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply) and meshes (.obj, sampled as by convert); several are rendered as one; a scene file (.toml)
+    /// Clouds (.ply, .splat, .spz) and meshes (.obj, sampled as by convert); several are rendered as one; a scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
@@ -142,7 +142,7 @@ pub struct CameraArguments {
     /// front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees [default: 30,20]
     #[arg(long, value_name = "VIEW", value_parser = values::view, allow_hyphen_values = true)]
     pub view: Option<ViewDirection>,
-    /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do]
+    /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do; -y for trained splats]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub up: Option<UpChoice>,
     /// An orthographic camera
@@ -197,9 +197,9 @@ pub struct SampleArguments {
 /// The splats and their surfaces.
 #[derive(Debug, Clone, Args)]
 pub struct SplatArguments {
-    /// How fragments become a colour
-    #[arg(long, value_name = "RESOLVE", default_value = "surface")]
-    pub resolve: ResolveChoice,
+    /// How fragments become a colour [default: surface; over if all inputs are trained splats]
+    #[arg(long, value_name = "RESOLVE")]
+    pub resolve: Option<ResolveChoice>,
     /// The shape of a splat's weight [default: windowed; gaussian with --resolve over]
     #[arg(long, value_name = "KERNEL")]
     pub kernel: Option<KernelChoice>,

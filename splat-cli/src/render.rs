@@ -24,7 +24,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
-    let options = resolve::options(arguments)?;
+    let options = resolve::options(arguments, false)?;
     output::check_picture(&arguments.output, options.aovs)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
@@ -37,6 +37,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
     times.read = time;
     let (mut cloud, reports) = input?;
+    let options = resolve::options(arguments, cloud.trained)?;
     note_assumptions(console, &cloud, &reports);
     let camera_path = arguments.camera.camera.as_deref();
     let camera = camera_path.map(|path| read_camera_json(path, resolve::default_near(&cloud))).transpose()?;

@@ -2,7 +2,8 @@
 //! have them.
 
 use crate::Error;
-use glam::Vec3;
+use glam::{DMat3, DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// The greatest degree.
 pub const MAX_DEGREE: usize = 3;
@@ -63,6 +64,29 @@ impl SphericalHarmonics {
         self.of(index).iter().all(|coefficient| coefficient.is_finite())
     }
 
+    /// Goes along with a cloud that `linear` turns, mirrors or scales: what was seen in a direction d now is in `linear` d.
+    ///
+    /// After a stretch or a shear that is no longer such a sum: then the nearest one, in the mean over all directions.
+    pub fn turn(&mut self, linear: &DMat3) {
+        let back = linear.inverse();
+        let turned = |direction: DVec3| (back * direction).normalize_or_zero().as_vec3();
+        // The term k of what term j becomes: the integral of Y_k(d) Y_j(back d), exact for a turn.
+        let mut shares = [[0.0; 16]; 16];
+        for (direction, weight) in quadrature() {
+            let before = basis(turned(direction)).map(f64::from);
+            for (row, value) in shares.iter_mut().zip(basis(direction.as_vec3()).map(f64::from)) {
+                row.iter_mut().zip(before).for_each(|(share, before)| *share += weight * value * before);
+            }
+        }
+        for splat in self.coefficients.chunks_exact_mut(terms(self.degree)) {
+            let mut old = [DVec3::ZERO; 16];
+            old.iter_mut().zip(&*splat).for_each(|(old, coefficient)| *old = coefficient.as_dvec3());
+            for (coefficient, row) in splat.iter_mut().zip(&shares) {
+                *coefficient = row.iter().zip(old).map(|(share, old)| *share * old).sum::<DVec3>().as_vec3();
+            }
+        }
+    }
+
     /// The display-referred colour of a splat seen in a unit direction: 0 or more, not limited above.
     pub fn color(&self, index: usize, direction: Vec3) -> [f32; 3] {
         let terms = self.of(index).iter().zip(basis(direction));
@@ -113,10 +137,27 @@ pub fn basis(direction: Vec3) -> [f32; 16] {
     ]
 }
 
+/// Directions and weights that integrate polynomials up to degree 7 over the sphere: Gauss and Legendre's four points along
+/// z, eight around.
+fn quadrature() -> impl Iterator<Item = (DVec3, f64)> {
+    const POINTS: [(f64, f64); 4] = [
+        (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+        (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+        (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+        (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+    ];
+    POINTS.into_iter().flat_map(|(z, weight)| {
+        let radius = (1.0 - z * z).sqrt();
+        (0..8).map(move |i| {
+            let (sin, cos) = libm::sincos(f64::from(i) * 0.25 * PI);
+            (DVec3::new(radius * cos, radius * sin, z), weight * 0.25 * PI)
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::PI;
 
     /// The associated Legendre function P_l^m(x), m >= 0, with the Condon-Shortley phase, by the usual recurrences.
     fn legendre(l: i32, m: i32, x: f64) -> f64 {
@@ -152,7 +193,7 @@ mod tests {
         (0..count).map(move |i| {
             let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
             let (angle, r) = (2.399_963_229_728_653 * i as f64, (1.0 - z * z).sqrt());
-            glam::DVec3::new(r * libm::cos(angle), r * libm::sin(angle), z).as_vec3()
+            DVec3::new(r * libm::cos(angle), r * libm::sin(angle), z).as_vec3()
         })
     }
 
@@ -227,6 +268,32 @@ mod tests {
         for other in [f32::MAX, f32::MIN] {
             assert!(!huge(other).unwrap().color(0, diagonal)[0].is_nan());
         }
+    }
+
+    #[test]
+    fn turned_colours_are_seen_in_turned_directions() {
+        let values: Vec<Vec3> =
+            (0..32).map(|i| Vec3::new(0.1 * i as f32 - 1.0, 0.03 * (i * i % 50) as f32, -0.2)).collect();
+        let before = SphericalHarmonics::new(3, values).unwrap();
+        let mirror = DMat3::from_diagonal(DVec3::new(2.0, -2.0, 2.0));
+        for linear in [DMat3::IDENTITY, DMat3::from_axis_angle(DVec3::ONE.normalize(), 2.0) * 5.0, mirror] {
+            let mut after = before.clone();
+            after.turn(&linear);
+            for direction in directions(50) {
+                let turned = (linear * direction.as_dvec3()).normalize().as_vec3();
+                for index in 0..2 {
+                    let pair = before.color(index, direction).into_iter().zip(after.color(index, turned));
+                    assert!(
+                        pair.into_iter().all(|(old, new)| (old - new).abs() < 2e-5),
+                        "{linear} {direction}"
+                    );
+                }
+            }
+        }
+        // A stretch leaves the basis: still a sum of the same degree, and finite.
+        let mut stretched = before.clone();
+        stretched.turn(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 4.0)));
+        assert!((0..2).all(|index| stretched.is_finite(index)) && stretched != before);
     }
 
     #[test]
