@@ -93,7 +93,7 @@ impl Gaussians {
 }
 
 /// The normal and the sigma-scaled axes of the disc that is left of an ellipsoid without its shortest axis (of equal ones, the
-/// last). The normal is their cross product.
+/// first). The normal is their cross product.
 ///
 /// Without a rotation (a quaternion of zeros) the normal is zero, and with a value that is not finite it is not a number:
 /// the renderer drops either.
@@ -107,8 +107,8 @@ fn surfel(scales: [f64; 3], [w, x, y, z]: [f64; 4]) -> (Vec3, [Vec3; 2]) {
         return (Vec3::NAN, [Vec3::NAN; 2]);
     }
     let columns = DMat3::from_quat(rotation / length);
-    let shortest = (0..3).rev().reduce(|least, axis| if scales[axis] < scales[least] { axis } else { least });
-    let normal = shortest.unwrap_or(2);
+    let shorter = |least: usize, axis: usize| if scales[axis] < scales[least] { axis } else { least };
+    let normal = [1, 2].into_iter().fold(0, shorter);
     let axis = |axis: usize| (columns.col(axis % 3) * scales[axis % 3]).as_vec3();
     (columns.col(normal).as_vec3(), [axis(normal + 1), axis(normal + 2)])
 }
@@ -133,8 +133,9 @@ mod tests {
             ([2.0, 1.0, 3.0], 1),
             ([2.0, 3.0, 1.0], 2),
             ([2.0, 3.0, 0.0], 2),
-            ([1.0, 1.0, 1.0], 2),
-            ([1.0, 1.0, 3.0], 1),
+            ([1.0, 1.0, 1.0], 0),
+            ([1.0, 1.0, 3.0], 0),
+            ([3.0, 1.0, 1.0], 1),
         ] {
             let (n, [t1, t2]) = surfel(scales, rotation);
             assert!((n.as_dvec3() - columns.col(normal)).length() < 1e-6, "{scales:?}");
