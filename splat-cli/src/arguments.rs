@@ -29,7 +29,7 @@ pub struct Arguments {
 pub enum Command {
     /// Render clouds and meshes to a picture
     Render(Box<RenderArguments>),
-    /// Make a cloud (.ply) from meshes and clouds
+    /// Make a cloud (.ply, .splat) from meshes and clouds
     ///
     /// Meshes are covered evenly with surfels: an OBJ file, and a PLY file that has faces (which render takes for the cloud
     /// of its vertices). Each surfel has an area, a normal, axes and, where the mesh has them, colour and texture
@@ -44,10 +44,10 @@ pub enum Command {
 /// `splat convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Meshes (.obj, or .ply with faces) and clouds (.ply); several become one cloud
+    /// Meshes (.obj, or .ply with faces) and clouds (.ply, .splat, .spz); several become one cloud
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// The cloud: .ply
+    /// The cloud: .ply, or .splat for viewers of trained splats
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Surfels on each mesh
@@ -70,7 +70,7 @@ pub const DEFAULT_POINTS: usize = 200_000;
 /// `splat info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
-    /// A cloud (.ply, points3D of COLMAP), a mesh (.obj) or cameras (.json, .log, a COLMAP folder)
+    /// A cloud (.ply, .splat, .spz, points3D of COLMAP), a mesh (.obj) or cameras (.json, .log, a COLMAP folder)
     pub file: PathBuf,
     /// Write JSON
     #[arg(long)]
@@ -103,8 +103,8 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply, a COLMAP folder or its points3D) and meshes (.obj, sampled as by convert), several as one; or a
-    /// scene file (.toml)
+    /// Clouds (.ply, .splat, .spz, a COLMAP folder or its points3D) and meshes (.obj, sampled as by convert), several as one;
+    /// or a scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
@@ -149,7 +149,7 @@ pub struct CameraArguments {
     /// front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees [default: 30,20]
     #[arg(long, value_name = "VIEW", value_parser = values::view, allow_hyphen_values = true)]
     pub view: Option<ViewDirection>,
-    /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do]
+    /// The axis that points up [default: y; z where the cloud lies far from zero, as maps do; -y for trained splats]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub up: Option<UpChoice>,
     /// An orthographic camera, from top, bottom, front, back, left or right or else as --view says
@@ -208,9 +208,9 @@ pub struct SampleArguments {
 /// The splats and their surfaces.
 #[derive(Debug, Clone, Args)]
 pub struct SplatArguments {
-    /// How fragments become a colour
-    #[arg(long, value_name = "RESOLVE", default_value = "surface")]
-    pub resolve: ResolveChoice,
+    /// How fragments become a colour [default: surface; over if all inputs are trained splats]
+    #[arg(long, value_name = "RESOLVE")]
+    pub resolve: Option<ResolveChoice>,
     /// The shape of a splat's weight [default: windowed; gaussian with --resolve over]
     #[arg(long, value_name = "KERNEL")]
     pub kernel: Option<KernelChoice>,

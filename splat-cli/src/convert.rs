@@ -5,8 +5,14 @@ use crate::inputs::{self, Reading, Sampling};
 use crate::progress::Progress;
 use crate::usage::UsageError;
 use crate::{console::Console, output};
-use splat_io::{PlyEncoding, write_ply};
+use splat_core::Kernel;
+use splat_core::prepare::{PrepareOptions, prepare};
+use splat_io::{PlyEncoding, write_ply, write_splat};
 use std::time::Instant;
+
+/// What a `.splat` file needs of a cloud: normals and sizes.
+const FOR_SPLATS: PrepareOptions =
+    PrepareOptions { kernel: Kernel::Gaussian, cutoff: 9.0, areas: false, size_scale: 1.0 };
 
 /// Runs the command.
 ///
@@ -17,23 +23,37 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
     let console: Console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let path = &arguments.output;
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("ply")) {
-        return Err(UsageError::new(format!("{}: expected a name that ends in .ply", path.display())).into());
+    let has_extension =
+        |name: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(name));
+    if !has_extension("ply") && !has_extension("splat") {
+        let message = format!("{}: expected a name that ends in .ply or .splat", path.display());
+        return Err(UsageError::new(message).into());
     }
     output::check_file(path)?;
 
     let sampling = Sampling { points: arguments.points, seed: arguments.seed };
     let reading = Reading { sampling, with_faces: true };
     let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
-    let (cloud, reports) = input?;
+    let (mut cloud, reports) = input?;
     for report in &reports {
         for assumption in &report.assumptions {
             console.note(format_args!("{}: {assumption}", report.path.display()));
         }
     }
-    let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
-    let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));
-    written?;
+    if cloud.harmonics.is_some() {
+        console.warn(format_args!("{}: colours no longer depend on the view", path.display()));
+    }
+    if has_extension("splat") {
+        progress.stage("prepare", |_| prepare(&mut cloud, &FOR_SPLATS));
+        let (written, _) = progress.stage("write", |_| write_splat(path, &cloud));
+        if let skipped @ 1.. = written? {
+            console.warn(format_args!("{}: {skipped} points left out that cannot be drawn", path.display()));
+        }
+    } else {
+        let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
+        let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));
+        written?;
+    }
     let seconds = start.elapsed().as_secs_f64();
     console.summary(format_args!("{}: {} points, {seconds:.1} s", path.display(), cloud.len()));
     Ok(())

@@ -73,6 +73,9 @@ pub fn options(options: &RenderOptions) -> String {
 pub fn assumptions(cloud: &Cloud) -> Vec<String> {
     let mut assumptions = vec![match assumed_up(cloud) {
         Up::Z => "z is up, since the points lie far from zero as in maps (--up)".to_owned(),
+        Up::MinusY => {
+            "y is down, as in the axes of the cameras that splats are trained with (--up)".to_owned()
+        }
         _ => "y is up (--up)".to_owned(),
     }];
     if cloud.is_empty() {
@@ -85,7 +88,12 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
     if let unknown @ 1.. = unknown_sizes(cloud) {
         assumptions.push(format!("{unknown} sizes are estimated from the spacing of the points"));
     }
-    if cloud.areas.is_none() {
+    if cloud.trained {
+        assumptions
+            .push("trained splats are blended one by one, as they are coloured (--resolve)".to_owned());
+        let strays = "a fitted camera leaves out strays: splats far outside of the bulk of the others";
+        assumptions.push(strays.to_owned());
+    } else if cloud.areas.is_none() {
         assumptions.push("areas are estimated from neighbours".to_owned());
     }
     if cloud.colors.is_none() {
@@ -126,7 +134,7 @@ mod tests {
             let parse = |line: &str| {
                 let line = format!("splat render in.ply -o out.exr {line}");
                 match Arguments::parse_from(line.split_whitespace()).command {
-                    Command::Render(arguments) => resolve::options(&arguments).unwrap(),
+                    Command::Render(arguments) => resolve::options(&arguments, false).unwrap(),
                     other => panic!("{other:?}"),
                 }
             };

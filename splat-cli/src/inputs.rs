@@ -2,11 +2,12 @@
 
 use crate::arguments::DEFAULT_POINTS;
 use anyhow::{Context, bail, ensure};
-use glam::DVec3;
-use splat_core::{Cloud, Shapes};
+use glam::{DVec3, Vec3};
+use splat_core::harmonics::{constant_term, terms};
+use splat_core::{Cloud, Shapes, SphericalHarmonics, srgb};
 use splat_io::{
     Import, ImportReport, MeshImport, Sampled, ply_has_faces, points3d::find_points3d, read_obj, read_ply,
-    read_ply_mesh, read_points3d, sample_surface,
+    read_ply_mesh, read_points3d, read_trained, sample_surface,
 };
 use std::path::{Path, PathBuf};
 
@@ -60,14 +61,27 @@ pub fn is_obj(path: &Path) -> bool {
 
 /// Reads a cloud, or a mesh as a cloud.
 fn read_one(path: &Path, reading: Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
-    if let Some(points) = find_points3d(path) {
-        Ok(read_points3d(&points)?)
-    } else if is_obj(path) {
+    if is_obj(path) {
         sampled(read_obj(path)?, reading.sampling, progress)
+    } else if let Some(points) = find_points3d(path) {
+        Ok(read_points3d(&points)?)
+    } else if let Some(import) = read_trained(path)? {
+        Ok(import)
     } else if reading.with_faces && ply_has_faces(path)? {
         sampled(read_ply_mesh(path)?, reading.sampling, progress)
     } else {
         Ok(read_ply(path)?)
+    }
+}
+
+/// Reads a cloud of any format.
+pub fn read_cloud(path: &Path) -> Result<Import, splat_io::Error> {
+    if let Some(points) = find_points3d(path) {
+        return read_points3d(&points);
+    }
+    match read_trained(path)? {
+        Some(import) => Ok(import),
+        None => read_ply(path),
     }
 }
 
@@ -98,7 +112,7 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
 /// Joins clouds, each with its name for messages.
 ///
 /// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
-/// told from another. Missing opacities are opaque; areas and texture coordinates are kept only if every cloud has them.
+/// told from another. Missing opacities are opaque; colours that do not depend on the view stay so; areas and texture coordinates are kept only if every cloud has them.
 fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     if clouds.len() > 1 {
         clouds.retain(|(_, cloud)| !cloud.is_empty());
@@ -112,6 +126,8 @@ fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     let normals = |cloud: &Cloud| Some(cloud.normals.clone()).filter(|normals| !normals.is_empty());
     joined.normals = all_or_none(&clouds, "normals", normals)?.unwrap_or_default();
     joined.colors = all_or_none(&clouds, "colours", |cloud| cloud.colors.clone())?;
+    joined.harmonics = join_harmonics(&clouds)?;
+    joined.trained = clouds.iter().all(|(_, cloud)| cloud.trained);
     if clouds.iter().any(|(_, cloud)| cloud.opacities.is_some()) {
         let opacities = |cloud: &Cloud| cloud.opacities.clone().unwrap_or_else(|| vec![1.0; cloud.len()]);
         joined.opacities = Some(clouds.iter().flat_map(|(_, cloud)| opacities(cloud)).collect());
@@ -132,6 +148,28 @@ fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     joined.shapes =
         discs.map(Shapes::Discs).or(ellipses.map(Shapes::Ellipses)).context("clouds of no shape")?;
     Ok(joined)
+}
+
+/// The harmonics of all clouds, of the greatest degree; `None` if no cloud has any. All or none have colours.
+fn join_harmonics(clouds: &[(&Path, Cloud)]) -> anyhow::Result<Option<SphericalHarmonics>> {
+    let degrees = clouds.iter().filter_map(|(_, cloud)| Some(cloud.harmonics.as_ref()?.degree()));
+    let Some(degree) = degrees.max() else { return Ok(None) };
+    let mut coefficients = Vec::new();
+    for (_, cloud) in clouds {
+        for index in 0..cloud.len() {
+            let start = coefficients.len();
+            match (&cloud.harmonics, &cloud.colors) {
+                (Some(harmonics), _) => coefficients.extend_from_slice(harmonics.of(index)),
+                (None, Some(colors)) => {
+                    let term = |linear: f32| constant_term(srgb::encode(linear.into()) as f32);
+                    coefficients.push(Vec3::from_array(colors[index].to_array().map(term)));
+                }
+                (None, None) => {}
+            }
+            coefficients.resize(start + terms(degree), Vec3::ZERO);
+        }
+    }
+    Ok(Some(SphericalHarmonics::new(degree, coefficients)?))
 }
 
 /// One property of all clouds, one after the other; `None` if no cloud has it.
@@ -176,7 +214,6 @@ pub fn check_usable(cloud: &Cloud, reports: &[ImportReport]) -> anyhow::Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     fn cloud(at: DVec3, count: usize) -> Cloud {
         let points: Vec<DVec3> = (0..count).map(|i| at + DVec3::X * i as f64).collect();
@@ -221,6 +258,24 @@ mod tests {
             let message = joined(vec![plain.clone(), other]).unwrap_err().to_string();
             assert!(message.contains(what), "{message}");
         }
+    }
+
+    #[test]
+    fn colours_by_direction_are_joined_with_others() {
+        let mut plain = cloud(DVec3::ZERO, 1);
+        plain.colors = Some(vec![Vec3::new(1.0, 0.0, 0.25)]);
+        let degree_1 = vec![Vec3::ONE, Vec3::X, Vec3::Y, Vec3::Z];
+        let mut trained = Cloud { trained: true, ..plain.clone() };
+        trained.harmonics = Some(SphericalHarmonics::new(1, degree_1.clone()).unwrap());
+        let all = joined(vec![trained.clone(), plain.clone()]).unwrap();
+        assert!(all.check_lengths().is_ok() && !all.trained);
+        let harmonics = all.harmonics.unwrap();
+        assert_eq!(harmonics.of(0), degree_1);
+        let color = Vec3::from_array(harmonics.color(1, Vec3::X));
+        let expected = Vec3::new(1.0, 0.0, srgb::encode(0.25) as f32);
+        assert!(color.abs_diff_eq(expected, 1e-6), "{color}");
+        assert!(joined(vec![trained.clone(), trained]).unwrap().trained);
+        assert_eq!(joined(vec![plain.clone(), plain]).unwrap().harmonics, None);
     }
 
     #[test]

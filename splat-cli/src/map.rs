@@ -200,7 +200,7 @@ mod tests {
     fn map(options: &str) -> anyhow::Result<(Camera, RenderOptions)> {
         let line = ["splat", "render", "in.ply", "-o", "x.png"].into_iter().chain(options.split_whitespace());
         let Command::Render(arguments) = Arguments::parse_from(line).command else { panic!("not render") };
-        let options = crate::resolve::options(&arguments)?;
+        let options = crate::resolve::options(&arguments, false)?;
         Ok((camera(&arguments, &cloud(), &options)?, options))
     }
 

@@ -25,7 +25,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let start = Instant::now();
     let console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
-    let options = resolve::options(arguments)?;
+    let options = resolve::options(arguments, false)?;
     output::check_picture(&arguments.output, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
@@ -38,6 +38,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
     times.read = time;
     let (mut cloud, reports) = input?;
+    let options = resolve::options(arguments, cloud.trained)?;
     note_assumptions(console, &cloud, &reports);
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
 

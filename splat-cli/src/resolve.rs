@@ -22,11 +22,12 @@ const DEFAULT_VIEW: ViewDirection = ViewDirection { azimuth: 30.0, elevation: 20
 /// The light from above the viewer's right shoulder, for someone who looks at the front.
 const DEFAULT_LIGHT: ViewDirection = ViewDirection { azimuth: 45.0, elevation: 45.0 };
 
-/// The options of the renderer, save what depends on the cloud: shading and window.
+/// The options of the renderer, save what depends on the cloud: shading and window; `trained` says whether it is one of
+/// trained splats ([`Cloud::trained`]), on which the defaults depend, but not whether the options are right.
 ///
 /// # Errors
 /// Values out of range, and options that contradict each other.
-pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError> {
+pub fn options(arguments: &RenderArguments, trained: bool) -> Result<RenderOptions, UsageError> {
     let CameraArguments { camera, view, ortho, fstop, lens_radius, focus, blades, .. } = &arguments.camera;
     if view.is_some() && ortho.flatten().is_some() {
         return Err(UsageError::new("--ortho says from where already: leave out --view"));
@@ -40,7 +41,8 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
         return Err(UsageError::new("--light says nothing without --shading lambert"));
     }
     material::check(&arguments.material)?;
-    let (kernel, cutoff) = match splats.resolve {
+    let resolve = resolve_choice(splats, trained);
+    let (kernel, cutoff) = match resolve {
         ResolveChoice::Surface => (Kernel::Windowed, 4.0),
         ResolveChoice::Over => (Kernel::Gaussian, 9.0),
     };
@@ -53,7 +55,7 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
         kernel: splats.kernel.map_or(kernel, Kernel::from),
         cutoff: splats.cutoff.unwrap_or(cutoff),
         table: splats.exp.into(),
-        resolve: resolve_mode(splats)?,
+        resolve: resolve_mode(resolve, splats)?,
         cull: splats.cull,
         background: splats.background.0,
         aovs: arguments.outputs.aov.unwrap_or_default(),
@@ -68,9 +70,17 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
 
 const NEEDS_LENS: &str = "--focus and --blades need a lens: add --fstop or --lens-radius";
 
-/// How fragments become a colour.
-fn resolve_mode(splats: &SplatArguments) -> Result<Resolve, UsageError> {
+/// Where `--resolve` leaves it open, trained splats are blended one by one, unless another option speaks of surfaces.
+fn resolve_choice(splats: &SplatArguments, trained: bool) -> ResolveChoice {
     let SplatArguments { resolve, coverage, wsat, thickness, .. } = *splats;
+    let of_surfaces = coverage.is_some() || wsat.is_some() || thickness.is_some();
+    let default = if trained && !of_surfaces { ResolveChoice::Over } else { ResolveChoice::Surface };
+    resolve.unwrap_or(default)
+}
+
+/// How fragments become a colour.
+fn resolve_mode(resolve: ResolveChoice, splats: &SplatArguments) -> Result<Resolve, UsageError> {
+    let SplatArguments { coverage, wsat, thickness, .. } = *splats;
     if resolve == ResolveChoice::Over {
         let given = [
             ("--coverage", coverage.is_some()),
@@ -96,9 +106,14 @@ fn resolve_mode(splats: &SplatArguments) -> Result<Resolve, UsageError> {
     Ok(Resolve::Surface { coverage, thickness })
 }
 
-/// The up axis that is assumed: z for a cloud far from zero, which is a map.
+/// The up axis that is assumed: z for a cloud far from zero, which is a map; -y for trained splats, which have the axes of a
+/// camera.
 pub fn assumed_up(cloud: &Cloud) -> Up {
-    if cloud.origin == DVec3::ZERO { Up::Y } else { Up::Z }
+    match cloud.origin == DVec3::ZERO {
+        false => Up::Z,
+        true if cloud.trained => Up::MinusY,
+        true => Up::Y,
+    }
 }
 
 /// The default near depth for a camera file, in scene units.
@@ -229,33 +244,35 @@ mod tests {
 
     fn resolved(line: &str, cloud: &Cloud) -> anyhow::Result<(Camera, RenderOptions)> {
         let arguments = arguments(line);
-        let options = options(&arguments)?;
+        let options = options(&arguments, cloud.trained)?;
         let camera = Fitted::new(&arguments, cloud, &options)?.camera(0);
         against_cloud(&arguments, options, camera, cloud)
     }
 
     #[test]
     fn no_options_are_the_defaults_of_the_renderer() {
-        assert_eq!(options(&arguments("")).unwrap(), RenderOptions::default());
+        assert_eq!(options(&arguments(""), false).unwrap(), RenderOptions::default());
     }
 
     #[test]
     fn defaults_depend_on_the_resolve_and_explicit_options_win() {
-        let over = options(&arguments("--resolve over")).unwrap();
+        let over = options(&arguments("--resolve over"), false).unwrap();
         assert_eq!((over.kernel, over.cutoff, over.resolve), (Kernel::Gaussian, 9.0, Resolve::Over));
-        let mixed = options(&arguments("--resolve over --kernel disc --cutoff 1")).unwrap();
+        let mixed = options(&arguments("--resolve over --kernel disc --cutoff 1"), false).unwrap();
         assert_eq!((mixed.kernel, mixed.cutoff), (Kernel::Disc, 1.0));
+        assert_eq!(options(&arguments(""), true).unwrap(), over);
+        assert_eq!(options(&arguments("--resolve surface"), true).unwrap(), RenderOptions::default());
     }
 
     #[test]
     fn surfaces_can_be_soft_and_as_in_the_listing() {
-        let soft = options(&arguments("--coverage soft --wsat 0.75 --thickness listing")).unwrap();
+        let soft = options(&arguments("--coverage soft --wsat 0.75 --thickness listing"), true).unwrap();
         let expected = Resolve::Surface {
             coverage: Coverage::Soft { saturation: 0.75 },
             thickness: Thickness::WholeSplat,
         };
         assert_eq!(soft.resolve, expected);
-        assert_eq!(options(&arguments("--thickness 0.25")).unwrap().thickness, 0.25);
+        assert_eq!(options(&arguments("--thickness 0.25"), true).unwrap().thickness, 0.25);
     }
 
     #[test]
@@ -273,13 +290,15 @@ mod tests {
             "--spp 2000 --pattern poisson",
         ];
         for line in contradictions {
-            assert!(options(&arguments(line)).is_err(), "{line}");
+            assert!(options(&arguments(line), false).is_err(), "{line}");
+            assert!(options(&arguments(line), true).is_err(), "{line}");
         }
     }
 
     #[test]
-    fn maps_have_z_up() {
+    fn maps_have_z_up_and_trained_splats_y_down() {
         assert_eq!(assumed_up(&cloud(DVec3::ZERO)), Up::Y);
+        assert_eq!(assumed_up(&Cloud { trained: true, ..cloud(DVec3::ZERO) }), Up::MinusY);
         assert_eq!(assumed_up(&cloud(DVec3::new(5e5, 5e6, 100.0))), Up::Z);
     }
 
@@ -315,7 +334,7 @@ mod tests {
         };
         let lens_of = |line: &str, lens| {
             let arguments = arguments(&format!("--camera c.json {line}"));
-            let options = options(&arguments).unwrap();
+            let options = options(&arguments, false).unwrap();
             against_cloud(&arguments, options, camera(lens), &cloud).map(|(camera, _)| camera.lens())
         };
         assert_eq!(lens_of("", Some(own)).unwrap(), Some(own));

@@ -1,6 +1,6 @@
 //! A cloud of oriented point splats, as it comes from a file.
 
-use crate::Error;
+use crate::{Error, SphericalHarmonics};
 use glam::{DVec3, Vec2, Vec3};
 
 /// Oriented point splats, as a structure of arrays.
@@ -20,6 +20,9 @@ pub struct Cloud {
     pub shapes: Shapes,
     /// Linear, scene-referred colours; `None` where the cloud has none.
     pub colors: Option<Vec<Vec3>>,
+    /// Colours by the direction of view, which then count instead of `colors`: those are the same without the view, for
+    /// whoever needs one colour a splat. `None` where colours do not depend on the view.
+    pub harmonics: Option<SphericalHarmonics>,
     /// Opacities in [0, 1]; `None` is opaque.
     pub opacities: Option<Vec<f32>>,
     /// Surface area that each splat stands for, in squared scene units; `None` is unknown (see
@@ -29,6 +32,9 @@ pub struct Cloud {
     pub texture_coordinates: Option<Vec<TextureCoordinates>>,
     /// Whether the normals tell the outside from the inside. Without that every splat faces the camera.
     pub oriented: bool,
+    /// Whether these are trained Gaussian splats, to be blended one by one ([`splat_abuffer::Resolve::Over`]) and not
+    /// joined into surfaces. The renderer does as its options say; this is for whoever chooses them.
+    pub trained: bool,
 }
 
 /// The extent of each splat.
@@ -100,7 +106,7 @@ impl TextureCoordinates {
 /// Why a splat is never rendered. SPEC section 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Defect {
-    /// A coordinate, normal, size, colour, opacity, area or texture coordinate is infinite or not a number.
+    /// A coordinate, normal, size, colour, harmonic, opacity, area or texture coordinate is infinite or not a number.
     NotFinite,
     /// The normal, or the area spanned by the two axes, is zero.
     ZeroNormal,
@@ -165,6 +171,7 @@ impl Cloud {
             ("normals", (!self.normals.is_empty()).then_some(self.normals.len())),
             ("shapes", Some(self.shapes.len())),
             ("colors", self.colors.as_ref().map(Vec::len)),
+            ("spherical harmonics", self.harmonics.as_ref().map(SphericalHarmonics::len)),
             ("opacities", self.opacities.as_ref().map(Vec::len)),
             ("areas", self.areas.as_ref().map(Vec::len)),
             ("texture coordinates", self.texture_coordinates.as_ref().map(Vec::len)),
@@ -185,6 +192,7 @@ impl Cloud {
         let finite = self.positions[index].is_finite()
             && self.normals[index].is_finite()
             && self.colors.as_ref().is_none_or(|colors| colors[index].is_finite())
+            && self.harmonics.as_ref().is_none_or(|harmonics| harmonics.is_finite(index))
             && self.opacities.as_ref().is_none_or(|opacities| opacities[index].is_finite())
             && self.areas.as_ref().is_none_or(|areas| areas[index].is_finite())
             && self.texture_coordinates.as_ref().is_none_or(|coordinates| coordinates[index].is_finite())
@@ -275,6 +283,11 @@ mod tests {
             assert_eq!(textured(coordinates).defect(0), Some(Defect::NotFinite), "{coordinates:?}");
         }
         let mut cloud = textured(good);
+        let of = |coefficient| SphericalHarmonics::new(0, vec![coefficient]).unwrap();
+        cloud.harmonics = Some(of(Vec3::ONE));
+        assert_eq!((cloud.check_lengths(), cloud.defect(0)), (Ok(()), None));
+        cloud.harmonics = Some(of(Vec3::new(0.0, f32::NAN, 0.0)));
+        assert_eq!(cloud.defect(0), Some(Defect::NotFinite));
         cloud.texture_coordinates = Some(Vec::new());
         assert_eq!(
             cloud.check_lengths().unwrap_err().to_string(),

@@ -58,6 +58,8 @@ pub const NEAR: f64 = 1e-4;
 
 /// The camera that shows every splat of a cloud (with normals and sizes), whole, as large as fits.
 ///
+/// Trained splats always have strays, and often a far background: of those only the splats within [`fence`] count.
+///
 /// # Errors
 /// [`Error::Empty`] if no splat of the cloud can be rendered; [`Error::Invalid`] for a size out of range.
 pub fn fit(cloud: &Cloud, framing: &Framing, options: &RenderOptions) -> Result<Camera, Error> {
@@ -122,6 +124,23 @@ fn rotation(framing: &Framing) -> DMat3 {
     DMat3::from_cols(right, down, forward).transpose()
 }
 
+/// A ball around the bulk of a cloud: its centre, as an offset from the origin, and its radius.
+///
+/// The centre is the median of the finite positions, by coordinate. With Q1 and Q3 the quartiles of their distances from
+/// it, the radius is Q3 + 1.5 (Q3 - Q1): Tukey's fence (1977), beyond which values count as outliers. `None` without points.
+pub fn fence(cloud: &Cloud) -> Option<(DVec3, f64)> {
+    let finite = || cloud.positions.iter().filter(|p| p.is_finite()).map(|p| p.as_dvec3());
+    let quantile = |mut values: Vec<f64>, quarter: usize| {
+        let rank = values.len().checked_sub(1)? * quarter / 4;
+        Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
+    };
+    let median = |axis: usize| quantile(finite().map(|p| p[axis]).collect(), 2);
+    let centre = DVec3::new(median(0)?, median(1)?, median(2)?);
+    let distances: Vec<f64> = finite().map(|p| p.distance(centre)).collect();
+    let (low, high) = (quantile(distances.clone(), 1)?, quantile(distances, 3)?);
+    Some((centre, high + 1.5 * (high - low)))
+}
+
 /// How far a cloud reaches, in camera axes relative to its origin.
 struct Support {
     /// Greatest x - slope w and y - slope w.
@@ -153,7 +172,13 @@ impl Support {
             low: DVec2::splat(f64::NEG_INFINITY),
             nearest: f64::INFINITY,
         };
-        for index in (0..cloud.len()).filter(|&index| cloud.defect(index).is_none()) {
+        let fence = if cloud.trained { fence(cloud) } else { None };
+        let is_within = |index: usize| {
+            fence.is_none_or(|(centre, radius)| {
+                cloud.positions[index].as_dvec3().distance_squared(centre) <= radius * radius
+            })
+        };
+        for index in (0..cloud.len()).filter(|&index| cloud.defect(index).is_none() && is_within(index)) {
             let splat = camera_splat(cloud, index, &view);
             let reach = |direction: DVec3| {
                 let [a, b] = splat.axes.map(|axis| direction.dot(axis));

@@ -130,7 +130,7 @@ impl<'a> PixelResolver<'a> {
         if let Some((_, shaded)) = self.shaded.iter().find(|&&(known, _)| known == rank) {
             return shaded.albedo;
         }
-        splat_color(self.cloud, self.splats[rank as usize].index as usize, self.shading)
+        splat_color(self.cloud, self.splats[rank as usize].index as usize, self.view, self.shading)
     }
 
     /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.

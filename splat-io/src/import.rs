@@ -75,6 +75,12 @@ pub enum Usage {
     TextureCoordinate,
     /// A derivative of a texture coordinate along a tangent axis.
     TextureDerivative,
+    /// A component of a rotation.
+    Rotation,
+    /// A coefficient of spherical harmonics: a part of the colour.
+    Harmonic,
+    /// A bound, between which packed numbers lie.
+    Bounds,
     /// A list of the vertices of a face.
     Face,
     /// Nothing, for this reason.
@@ -93,6 +99,9 @@ impl fmt::Display for Usage {
             Self::Tangent => write!(f, "tangent axis"),
             Self::TextureCoordinate => write!(f, "texture coordinate"),
             Self::TextureDerivative => write!(f, "derivative of a texture coordinate, per sigma"),
+            Self::Rotation => write!(f, "rotation"),
+            Self::Harmonic => write!(f, "color, by direction"),
+            Self::Bounds => write!(f, "bounds of packed numbers"),
             Self::Face => write!(f, "the corners of faces"),
             Self::Unused(reason) => write!(f, "not used ({reason})"),
         }

@@ -22,6 +22,7 @@ pub mod scene_file;
 mod source;
 pub mod srgb;
 pub mod texture_file;
+pub mod trained;
 
 pub use atomic::AtomicFile;
 pub use cameras::{
@@ -41,3 +42,4 @@ pub use png_file::{PngDepth, write_png};
 pub use points3d::read_points3d;
 pub use scene_file::{SceneFile, parse_scene, read_scene};
 pub use texture_file::{read_pyramid, read_pyramid_from};
+pub use trained::{read_splat, read_splat_from, read_spz, read_spz_from, read_trained, write_splat};

@@ -30,13 +30,17 @@
 mod ascii;
 mod binary;
 mod columns;
+mod compressed;
 mod faces;
+mod gaussians;
 mod header;
 mod roles;
+mod rows;
 mod scalar;
 #[cfg(test)]
 mod tests;
 mod tone;
+mod trained;
 mod writer;
 
 pub use writer::{PlyEncoding, write_ply};
@@ -47,6 +51,7 @@ use crate::{ElementReport, Error, Import, ImportReport, PropertyReport, Usage};
 use columns::{Columns, Outcome};
 use faces::Faces;
 use header::{Element, Format, Header};
+use rows::{Table, Tables};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -57,8 +62,7 @@ use std::path::Path;
 /// size) stay in their rows; the renderer recognises them.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Unsupported`] for trained Gaussian splats, compressed splats and what is no
-/// regular file; [`Error::Invalid`] for anything malformed, truncated, or claiming more rows than the file
+/// [`Error::Io`]; [`Error::Unsupported`] for what is no regular file; [`Error::Invalid`] for anything malformed, truncated, or claiming more rows than the file
 /// can hold; [`Error::Limit`] for a header of more than 1 MiB, 2^32 - 1 points or more, or more points than
 /// memory.
 pub fn read_ply(path: &Path) -> Result<Import, Error> {
@@ -85,8 +89,12 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64), Error> {
 pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import, Error> {
     let mut source = Source::new(reader, size, path);
     let header = Header::read(&mut source)?;
-    let mut tables = Tables::new(&header, false, &source)?;
-    tables.read(&header, &mut source)?;
+    let points = &header.elements[header.points(path)?];
+    if gaussians::is_trained(points) || compressed::is_packed(points) {
+        return trained::read(&header, source);
+    }
+    let mut tables = Surfels::new(&header, false, &source)?;
+    read_tables(&header, &mut source, &mut tables)?;
     let points = tables.points;
     let (sha256, bytes) = source.finish()?;
 
@@ -141,8 +149,8 @@ pub fn read_ply_mesh(path: &Path) -> Result<MeshImport, Error> {
 pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<MeshImport, Error> {
     let mut source = Source::new(reader, size, path);
     let header = Header::read(&mut source)?;
-    let mut tables = Tables::new(&header, true, &source)?;
-    tables.read(&header, &mut source)?;
+    let mut tables = Surfels::new(&header, true, &source)?;
+    read_tables(&header, &mut source, &mut tables)?;
     let (sha256, bytes) = source.finish()?;
 
     let points = tables.points;
@@ -169,7 +177,7 @@ pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<M
 }
 
 /// The tables of a file that are read; others are skipped.
-struct Tables {
+struct Surfels {
     /// Index of the table of points.
     points: usize,
     columns: Columns,
@@ -177,7 +185,7 @@ struct Tables {
     faces: Option<(usize, Faces)>,
 }
 
-impl Tables {
+impl Surfels {
     /// Finds the tables and holds what they claim against the file's size.
     fn new<R: Read>(header: &Header, with_faces: bool, source: &Source<R>) -> Result<Self, Error> {
         let points = header.points(source.path())?;
@@ -188,24 +196,32 @@ impl Tables {
         let faces = faces.map(|index| (index, Faces::new(&header.elements[index], vertices)));
         Ok(Self { points, columns, faces })
     }
+}
 
-    /// Reads them, up to the last one.
-    fn read<R: Read>(&mut self, header: &Header, source: &mut Source<R>) -> Result<(), Error> {
-        match header.format {
-            Format::Ascii => ascii::read(source, header, self),
-            Format::BinaryLittleEndian => binary::read::<_, false>(source, header, self),
-            Format::BinaryBigEndian => binary::read::<_, true>(source, header, self),
-        }
-    }
-
-    /// The number of tables from the first one to the last that is read.
+impl Tables for Surfels {
     fn end(&self) -> usize {
         self.faces.as_ref().map_or(self.points, |(index, _)| self.points.max(*index)) + 1
     }
 
-    /// The faces, if they are the table of this index.
-    fn faces_at(&mut self, index: usize) -> Option<&mut Faces> {
-        self.faces.as_mut().filter(|(faces, _)| *faces == index).map(|(_, faces)| faces)
+    fn table(&mut self, index: usize) -> Table<'_> {
+        match &mut self.faces {
+            _ if index == self.points => Table::Rows(&mut self.columns),
+            Some((place, faces)) if *place == index => Table::Faces(faces),
+            _ => Table::Skipped,
+        }
+    }
+}
+
+/// Reads the tables that are wanted.
+fn read_tables<R: Read>(
+    header: &Header,
+    source: &mut Source<R>,
+    tables: &mut impl Tables,
+) -> Result<(), Error> {
+    match header.format {
+        Format::Ascii => ascii::read(source, header, tables),
+        Format::BinaryLittleEndian => binary::read::<_, false>(source, header, tables),
+        Format::BinaryBigEndian => binary::read::<_, true>(source, header, tables),
     }
 }
 

@@ -228,13 +228,13 @@ pub fn adversarial(count: usize, seed: u64, camera: &Camera, known: Knowledge) -
         colors: Some((0..count).map(|_| Vec3::from_array([0; 3].map(|_| random.unit() as f32))).collect()),
         opacities: known.opacities.then(|| splats.iter().map(|splat| splat.opacity).collect()),
         areas: known.areas.then(|| areas.collect()),
-        texture_coordinates: None,
         shapes: if known.ellipses {
             Shapes::Ellipses(axes.iter().map(|axes| axes.map(|axis| axis.as_vec3())).collect())
         } else {
             Shapes::Discs(axes.iter().map(|[t1, _]| t1.length() as f32).collect())
         },
         oriented: known.orientation,
+        ..Cloud::default()
     };
     (cloud, kinds)
 }

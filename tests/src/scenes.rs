@@ -3,7 +3,9 @@
 use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::prepare::{PrepareOptions, prepare};
-use splat_core::{Camera, Cloud, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes};
+use splat_core::{
+    Camera, Cloud, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes, SphericalHarmonics,
+};
 
 use crate::random::Random;
 
@@ -66,10 +68,15 @@ pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
             Shapes::Ellipses(axes) => Shapes::Ellipses(pick(axes, order)),
         },
         colors: cloud.colors.as_ref().map(|values| pick(values, order)),
+        harmonics: cloud.harmonics.as_ref().map(|harmonics| {
+            let coefficients = order.iter().flat_map(|&i| harmonics.of(i).to_vec()).collect();
+            SphericalHarmonics::new(harmonics.degree(), coefficients).expect("whole splats")
+        }),
         opacities: cloud.opacities.as_ref().map(|values| pick(values, order)),
         areas: cloud.areas.as_ref().map(|values| pick(values, order)),
         texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
         oriented: cloud.oriented,
+        trained: cloud.trained,
     }
 }
 

@@ -469,7 +469,7 @@ impl Splat {
             back: splat.back,
             ke,
             cap,
-            color: splat_color(cloud, index, options.shading).map(|value| f64::from(value) * light),
+            color: splat_color(cloud, index, view, options.shading).map(|value| f64::from(value) * light),
             opacity: cloud.opacities.as_ref().map_or(1.0, |all| f64::from(all[index])),
         })
     }

@@ -1,10 +1,10 @@
 //! What is said of a cloud.
 
-use crate::describe;
+use crate::{describe, inputs};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
-use splat_core::{Cloud, Shapes};
-use splat_io::{Import, ImportReport, Usage, read_ply, read_points3d};
+use splat_core::{Cloud, Shapes, SphericalHarmonics};
+use splat_io::{Import, ImportReport, Usage};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -29,6 +29,10 @@ pub struct Summary {
     origin: [f64; 3],
     normals: Option<Normals>,
     colors: bool,
+    /// Degree of the spherical harmonics by which colours depend on the view.
+    harmonics: Option<usize>,
+    /// Whether they are trained Gaussian splats.
+    trained: bool,
     /// Least and greatest.
     opacities: Option<[f32; 2]>,
     areas: bool,
@@ -82,9 +86,7 @@ impl Summary {
     /// # Errors
     /// What the reader says.
     pub fn read(path: &Path) -> Result<Self, splat_io::Error> {
-        let points = splat_io::points3d::find_points3d(path);
-        let Import { cloud, report } =
-            points.map_or_else(|| read_ply(path), |points| read_points3d(&points))?;
+        let Import { cloud, report } = inputs::read_cloud(path)?;
         Ok(Self::new(cloud, report))
     }
 
@@ -119,6 +121,8 @@ impl Summary {
             origin: cloud.origin.to_array(),
             normals: (!cloud.normals.is_empty()).then(|| normals(&cloud)),
             colors: cloud.colors.is_some(),
+            harmonics: cloud.harmonics.as_ref().map(SphericalHarmonics::degree),
+            trained: cloud.trained,
             opacities: cloud.opacities.as_deref().and_then(range),
             areas: cloud.areas.is_some(),
             texture_coordinates: cloud.texture_coordinates.is_some(),
@@ -209,7 +213,10 @@ impl fmt::Display for Summary {
             }
         }
         let presence = |is_there: bool| if is_there { "yes" } else { "none" };
-        writeln!(f, "colours      {}", presence(self.colors))?;
+        match self.harmonics {
+            None => writeln!(f, "colours      {}", presence(self.colors))?,
+            Some(degree) => writeln!(f, "colours      by direction: spherical harmonics of degree {degree}")?,
+        }
         match self.opacities {
             None => writeln!(f, "opacities    none: opaque")?,
             Some([low, high]) => writeln!(f, "opacities    {low} to {high}")?,

@@ -86,11 +86,15 @@ pub fn print(arguments: &RenderArguments, matches: &ArgMatches) -> anyhow::Resul
             _ => text.push_str(&print::cloud(path, &DAffine3::IDENTITY, &[])),
         }
     }
-    // The words that metadata have for options are options; how light falls is left to the cloud.
-    let words = describe::options(&resolve::options(arguments)?);
+    // The words that metadata have for options are options; some are left to the cloud.
+    let words = describe::options(&resolve::options(arguments, false)?);
+    let mut left_to_cloud = vec!["shading"];
+    if arguments.splats.resolve.is_none() {
+        left_to_cloud.extend(["resolve", "kernel", "cutoff", "coverage", "thickness"]);
+    }
     let words: Vec<&str> = words.split_whitespace().collect();
     let pairs = words.windows(2).filter_map(|pair| Some((pair[0].strip_prefix("--")?, pair[1].to_owned())));
-    let settled: Vec<(&str, String)> = pairs.filter(|(name, _)| *name != "shading").collect();
+    let settled: Vec<(&str, String)> = pairs.filter(|(name, _)| !left_to_cloud.contains(name)).collect();
     let matches = matches.subcommand_matches("render").unwrap_or(matches);
     text.push_str(&print::settings(matches, &settled));
     Ok(std::io::stdout().write_all(text.as_bytes())?)

@@ -431,7 +431,7 @@ fn surface(
 ) -> SplatSurface {
     let color = if options.material.of(index).is_plain() {
         let light = light(splat, || shading_normal(cloud, index, view), view, options) as f32;
-        let color = splat_color(cloud, index, options.shading);
+        let color = splat_color(cloud, index, view, options.shading);
         finished_color(color.map(|value| value * light), options)
     } else {
         SplatShader::new(cloud, view, options, &ScalarLookup).whole(index, splat, exact).color
@@ -479,8 +479,13 @@ pub(crate) fn finished_color(color: [f32; 3], options: &RenderOptions) -> [f32; 
     color
 }
 
-/// The unlit, linear colour of a splat as the cloud has it.
-pub fn splat_color(cloud: &Cloud, index: usize, shading: Shading) -> [f32; 3] {
+/// The unlit, linear colour of a splat as the cloud has it, seen by this viewer.
+pub fn splat_color(cloud: &Cloud, index: usize, view: &View, shading: Shading) -> [f32; 3] {
+    if let Some(harmonics) = &cloud.harmonics {
+        let away = if view.orthographic { view.world_forward } else { from_eye(cloud, index, view) };
+        let color = harmonics.color(index, away.normalize_or_zero().as_vec3());
+        return color.map(|value| srgb::decode(f64::from(value)) as f32);
+    }
     match (&cloud.colors, shading) {
         (Some(colors), _) => colors[index].to_array(),
         (None, Shading::Color) => UNCOLORED,

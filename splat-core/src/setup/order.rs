@@ -97,6 +97,13 @@ fn compare_data(cloud: &Cloud, a: usize, b: usize) -> Ordering {
             }
         })
         .then_with(|| cloud.colors.as_ref().map_or(Ordering::Equal, |c| compare(c[a], c[b])))
+        .then_with(|| match &cloud.harmonics {
+            Some(h) => {
+                let pairs = h.of(a).iter().zip(h.of(b));
+                pairs.map(|(a, b)| compare(*a, *b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+            }
+            None => Ordering::Equal,
+        })
         .then_with(|| cloud.opacities.as_ref().map_or(Ordering::Equal, |o| o[a].total_cmp(&o[b])))
         .then_with(|| cloud.areas.as_ref().map_or(Ordering::Equal, |s| s[a].total_cmp(&s[b])))
         .then_with(|| {

@@ -185,7 +185,7 @@ impl<'a> SplatShader<'a> {
         let Material { texture, environment, .. } = self.material(splat.index);
         let albedo = match texture {
             Some(texture) => texture.color(&sight.point, self.images),
-            None => splat_color(self.cloud, splat.index, self.options.shading),
+            None => splat_color(self.cloud, splat.index, self.view, self.options.shading),
         };
         let seen = environment.as_ref().zip(sight.surroundings.as_ref());
         let seen = seen.map(|(environment, at)| environment.image().color(at, self.images));

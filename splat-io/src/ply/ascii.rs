@@ -1,10 +1,8 @@
 //! Tables as text: a row a line, numbers between blanks.
 
-use super::Tables;
-use super::columns::Columns;
 use super::faces::{Faces, List};
 use super::header::{Element, Header, Kind};
-use super::roles::{Row, SLOTS};
+use super::rows::{Rows, Table, Tables};
 use super::scalar::Scalar;
 use crate::error::quoted;
 use crate::source::Source;
@@ -18,16 +16,15 @@ const MOST_WORD_BYTES: usize = 1100;
 pub(super) fn read<R: Read>(
     source: &mut Source<R>,
     header: &Header,
-    tables: &mut Tables,
+    tables: &mut impl Tables,
 ) -> Result<(), Error> {
     let mut text = Text { source, line: header.next_line };
     for (index, element) in header.elements[..tables.end()].iter().enumerate() {
-        if index == tables.points {
-            text.read_points(element, &mut tables.columns)?;
-        } else if let Some(faces) = tables.faces_at(index) {
-            text.read_faces(element, faces)?;
-        } else if !element.properties.is_empty() {
-            text.skip_rows(element)?;
+        match tables.table(index) {
+            Table::Rows(rows) => text.read_rows(element, rows)?,
+            Table::Faces(faces) => text.read_faces(element, faces)?,
+            Table::Skipped if element.properties.is_empty() => {}
+            Table::Skipped => text.skip_rows(element)?,
         }
     }
     Ok(())
@@ -49,12 +46,12 @@ fn is_line_end(byte: u8) -> bool {
 }
 
 impl<R: Read> Text<'_, R> {
-    /// Reads the table of points.
-    fn read_points(&mut self, element: &Element, columns: &mut Columns) -> Result<(), Error> {
-        let mut values: Row = [0.0; SLOTS];
-        for row in 0..columns.count() as u64 {
+    /// Reads a table of which rows are wanted.
+    fn read_rows(&mut self, element: &Element, taker: &mut dyn Rows) -> Result<(), Error> {
+        let mut values = vec![0.0; taker.width()];
+        for row in 0..taker.count() as u64 {
             self.start_row(element, row)?;
-            for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+            for (property, slot) in element.properties.iter().zip(taker.slots()) {
                 let name = &property.name;
                 match (property.kind, *slot) {
                     (Kind::Scalar(kind), Some(slot)) => {
@@ -69,7 +66,7 @@ impl<R: Read> Text<'_, R> {
                 }
             }
             self.end_row(element, row)?;
-            columns.push(&values);
+            taker.push(&values);
         }
         Ok(())
     }

@@ -1,10 +1,8 @@
 //! Tables in binary, either endian.
 
-use super::Tables;
-use super::columns::Columns;
 use super::faces::{Faces, List};
 use super::header::{Element, Header, Kind};
-use super::roles::{Row, SLOTS};
+use super::rows::{Rows, Table, Tables};
 use super::scalar::Scalar;
 use crate::source::Source;
 use crate::{Error, Place};
@@ -14,17 +12,14 @@ use std::io::Read;
 pub(super) fn read<R: Read, const BIG: bool>(
     source: &mut Source<R>,
     header: &Header,
-    tables: &mut Tables,
+    tables: &mut impl Tables,
 ) -> Result<(), Error> {
     for (index, element) in header.elements[..tables.end()].iter().enumerate() {
-        if index == tables.points && element.is_fixed() {
-            read_fixed::<R, BIG>(source, element, &mut tables.columns)?;
-        } else if index == tables.points {
-            read_varying::<R, BIG>(source, element, &mut tables.columns)?;
-        } else if let Some(faces) = tables.faces_at(index) {
-            read_faces::<R, BIG>(source, element, faces)?;
-        } else {
-            skip::<R, BIG>(source, element)?;
+        match tables.table(index) {
+            Table::Rows(rows) if element.is_fixed() => read_fixed::<R, BIG>(source, element, rows)?,
+            Table::Rows(rows) => read_varying::<R, BIG>(source, element, rows)?,
+            Table::Faces(faces) => read_faces::<R, BIG>(source, element, faces)?,
+            Table::Skipped => skip::<R, BIG>(source, element)?,
         }
     }
     Ok(())
@@ -34,19 +29,19 @@ pub(super) fn read<R: Read, const BIG: bool>(
 fn read_fixed<R: Read, const BIG: bool>(
     source: &mut Source<R>,
     element: &Element,
-    columns: &mut Columns,
+    taker: &mut dyn Rows,
 ) -> Result<(), Error> {
     let row_bytes = element.least_bytes();
     let mut fields: Vec<(usize, Scalar, usize)> = Vec::new();
     let mut offset = 0;
-    for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+    for (property, slot) in element.properties.iter().zip(taker.slots()) {
         if let Kind::Scalar(kind) = property.kind {
             fields.extend(slot.map(|slot| (offset, kind, slot)));
             offset += kind.bytes();
         }
     }
-    let count = columns.count();
-    let mut values: Row = [0.0; SLOTS];
+    let count = taker.count();
+    let mut values = vec![0.0; taker.width()];
     let mut done = 0;
     while done < count {
         if !source.want(row_bytes)? {
@@ -58,7 +53,7 @@ fn read_fixed<R: Read, const BIG: bool>(
             for &(offset, kind, slot) in &fields {
                 values[slot] = kind.decode::<BIG>(&row[offset..]);
             }
-            columns.push(&values);
+            taker.push(&values);
         }
         source.consume(rows * row_bytes);
         done += rows;
@@ -70,11 +65,11 @@ fn read_fixed<R: Read, const BIG: bool>(
 fn read_varying<R: Read, const BIG: bool>(
     source: &mut Source<R>,
     element: &Element,
-    columns: &mut Columns,
+    taker: &mut dyn Rows,
 ) -> Result<(), Error> {
-    let mut values: Row = [0.0; SLOTS];
-    for row in 0..columns.count() {
-        for (property, slot) in element.properties.iter().zip(&columns.roles.slots) {
+    let mut values = vec![0.0; taker.width()];
+    for row in 0..taker.count() {
+        for (property, slot) in element.properties.iter().zip(taker.slots()) {
             match property.kind {
                 Kind::Scalar(kind) => {
                     let value = scalar::<R, BIG>(source, kind, element, row as u64)?;
@@ -85,7 +80,7 @@ fn read_varying<R: Read, const BIG: bool>(
                 Kind::List { count, item } => skip_list::<R, BIG>(source, count, item, element, row as u64)?,
             }
         }
-        columns.push(&values);
+        taker.push(&values);
     }
     Ok(())
 }

@@ -2,8 +2,9 @@
 
 use super::header::{Element, Header};
 use super::roles::{
-    AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, Row, SIZE, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
+    AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, SIZE, SLOTS, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
 };
+use super::rows::Rows;
 use super::scalar::Scalar;
 use super::tone::Tone;
 use crate::{Error, Usage};
@@ -89,50 +90,6 @@ impl Columns {
         room(&mut self.texture_coordinates, self.count)
     }
 
-    /// Number of rows that were claimed.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Adds a row.
-    #[inline]
-    pub fn push(&mut self, row: &Row) {
-        let triple = |slot: usize| DVec3::new(row[slot], row[slot + 1], row[slot + 2]);
-        self.positions.push(triple(POSITION.start));
-        if let Some(normals) = &mut self.normals {
-            normals.push(unit(triple(NORMAL.start)));
-        }
-        if let Some(colors) = &mut self.colors {
-            let channel = |channel: usize| self.tones[channel].linear(row[COLOR.start + channel]);
-            let color = Vec3::new(channel(0), channel(1), channel(2));
-            self.greatest_color = self.greatest_color.max(color.max_element());
-            colors.push(color);
-        }
-        if let Some(opacities) = &mut self.opacities {
-            let mut opacity = row[OPACITY] * self.opacity_scale;
-            if opacity.is_finite() && !(0.0..=1.0).contains(&opacity) {
-                opacity = opacity.clamp(0.0, 1.0);
-                self.clamped_opacities += 1;
-            }
-            opacities.push(opacity as f32);
-        }
-        if let Some(sizes) = &mut self.sizes {
-            sizes.push(row[SIZE] as f32);
-        }
-        if let Some(areas) = &mut self.areas {
-            areas.push(row[AREA] as f32);
-        }
-        if let Some(tangents) = &mut self.tangents {
-            let [u, v] = [TANGENTS.start, TANGENTS.start + 3].map(triple);
-            tangents.push([u.as_vec3(), v.as_vec3()]);
-        }
-        if let Some(coordinates) = &mut self.texture_coordinates {
-            let pair = |slot: usize| Vec2::new(row[slot] as f32, row[slot + 1] as f32);
-            let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
-            coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
-        }
-    }
-
     /// Makes the cloud and says what was assumed.
     pub fn finish(mut self, header: &Header) -> Outcome {
         let mut assumptions = Vec::new();
@@ -211,6 +168,57 @@ impl Columns {
         if self.clamped_opacities > 0 {
             let count = self.clamped_opacities;
             assumptions.push(format!("{count} opacities outside [0, 1] are clamped"));
+        }
+    }
+}
+
+impl Rows for Columns {
+    fn slots(&self) -> &[Option<usize>] {
+        &self.roles.slots
+    }
+
+    fn width(&self) -> usize {
+        SLOTS
+    }
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn push(&mut self, row: &[f64]) {
+        let triple = |slot: usize| DVec3::new(row[slot], row[slot + 1], row[slot + 2]);
+        self.positions.push(triple(POSITION.start));
+        if let Some(normals) = &mut self.normals {
+            normals.push(unit(triple(NORMAL.start)));
+        }
+        if let Some(colors) = &mut self.colors {
+            let channel = |channel: usize| self.tones[channel].linear(row[COLOR.start + channel]);
+            let color = Vec3::new(channel(0), channel(1), channel(2));
+            self.greatest_color = self.greatest_color.max(color.max_element());
+            colors.push(color);
+        }
+        if let Some(opacities) = &mut self.opacities {
+            let mut opacity = row[OPACITY] * self.opacity_scale;
+            if opacity.is_finite() && !(0.0..=1.0).contains(&opacity) {
+                opacity = opacity.clamp(0.0, 1.0);
+                self.clamped_opacities += 1;
+            }
+            opacities.push(opacity as f32);
+        }
+        if let Some(sizes) = &mut self.sizes {
+            sizes.push(row[SIZE] as f32);
+        }
+        if let Some(areas) = &mut self.areas {
+            areas.push(row[AREA] as f32);
+        }
+        if let Some(tangents) = &mut self.tangents {
+            let [u, v] = [TANGENTS.start, TANGENTS.start + 3].map(triple);
+            tangents.push([u.as_vec3(), v.as_vec3()]);
+        }
+        if let Some(coordinates) = &mut self.texture_coordinates {
+            let pair = |slot: usize| Vec2::new(row[slot] as f32, row[slot + 1] as f32);
+            let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
+            coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
         }
     }
 }

@@ -9,9 +9,6 @@ use std::path::Path;
 /// Number of values of a row that can be of use.
 pub(super) const SLOTS: usize = 24;
 
-/// The values of a row: a slot each, by meaning.
-pub(super) type Row = [f64; SLOTS];
-
 pub(super) const POSITION: Range<usize> = 0..3;
 pub(super) const NORMAL: Range<usize> = 3..6;
 pub(super) const COLOR: Range<usize> = 6..9;
@@ -78,9 +75,8 @@ pub(super) struct Roles {
 impl Roles {
     /// Decides what each property of the table of points is used for.
     ///
-    /// Refuses trained splats, and a table without the three coordinates.
+    /// Refuses a table without the three coordinates.
     pub fn assign(element: &Element, path: &Path) -> Result<Self, Error> {
-        refuse_trained_splats(element, path)?;
         let properties = &element.properties;
         let scalar = |index: usize| match properties[index].kind {
             Kind::Scalar(kind) => Some(kind),
@@ -132,22 +128,6 @@ impl Roles {
         }
         Ok(Self { slots, kinds, usages, size_name })
     }
-}
-
-/// Trained Gaussian splats look like points, but their numbers mean something else.
-fn refuse_trained_splats(element: &Element, path: &Path) -> Result<(), Error> {
-    let has = |name: &str| element.properties.iter().any(|property| property.name == name);
-    const EXPECTED: &str = "a PLY of surfels: x y z and, where known, normal, radius and color \
-                            (a later version reads trained splats)";
-    if has("packed_position") {
-        let found = "a compressed PLY of trained Gaussian splats (property packed_position)";
-        return Err(Error::unsupported(path, found, EXPECTED));
-    }
-    if ["rot_0", "rot_1", "rot_2", "rot_3", "scale_0", "f_dc_0"].into_iter().all(has) {
-        let found = "a PLY of trained Gaussian splats (properties rot_0 to rot_3, scale_0 and f_dc_0)";
-        return Err(Error::unsupported(path, found, EXPECTED));
-    }
-    Ok(())
 }
 
 /// Why a property that found no use has none.

@@ -5,6 +5,7 @@ mod damage;
 mod headers;
 mod meaning;
 mod roundtrip;
+mod trained;
 
 use super::scalar::Scalar;
 use super::*;

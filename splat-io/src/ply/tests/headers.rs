@@ -201,14 +201,3 @@ fn wrong_headers_are_refused_by_line() {
     let none = message(b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n");
     assert!(none.contains("found no property"), "{none}");
 }
-
-#[test]
-fn trained_splats_are_refused() {
-    let names = ["x", "y", "z", "f_dc_0", "opacity", "rot_0", "rot_1", "rot_2", "rot_3", "scale_0"];
-    let names = names.map(|name| format!("float {name}"));
-    let table = Table::vertex(names.each_ref().map(String::as_str), &[[0.0; 10]]);
-    let refusal = message(&file(Format::BinaryLittleEndian, &[table]));
-    assert!(refusal.contains("trained Gaussian splats") && refusal.contains("not supported"), "{refusal}");
-    let packed = Table::vertex(["uint packed_position"], &[[0.0]]);
-    assert!(message(&file(Format::BinaryLittleEndian, &[packed])).contains("packed_position"));
-}
