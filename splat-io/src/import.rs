@@ -75,6 +75,8 @@ pub enum Usage {
     TextureCoordinate,
     /// A derivative of a texture coordinate along a tangent axis.
     TextureDerivative,
+    /// A scalar field of the cloud.
+    Field,
     /// A list of the vertices of a face.
     Face,
     /// Nothing, for this reason.
@@ -93,6 +95,7 @@ impl fmt::Display for Usage {
             Self::Tangent => write!(f, "tangent axis"),
             Self::TextureCoordinate => write!(f, "texture coordinate"),
             Self::TextureDerivative => write!(f, "derivative of a texture coordinate, per sigma"),
+            Self::Field => write!(f, "scalar field"),
             Self::Face => write!(f, "the corners of faces"),
             Self::Unused(reason) => write!(f, "not used ({reason})"),
         }

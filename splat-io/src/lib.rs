@@ -18,6 +18,7 @@ pub mod ply;
 pub mod png_file;
 mod source;
 pub mod srgb;
+mod table;
 pub mod texture_file;
 
 pub use atomic::AtomicFile;

@@ -3,7 +3,7 @@
 use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::prepare::{PrepareOptions, prepare};
-use splat_core::{Camera, Cloud, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes};
+use splat_core::{Camera, Cloud, Field, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes};
 
 use crate::random::Random;
 
@@ -70,6 +70,11 @@ pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
         areas: cloud.areas.as_ref().map(|values| pick(values, order)),
         texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
         oriented: cloud.oriented,
+        fields: cloud
+            .fields
+            .iter()
+            .map(|field| Field { name: field.name.clone(), values: pick(&field.values, order) })
+            .collect(),
     }
 }
 

@@ -1,13 +1,11 @@
 //! Tables as text: a row a line, numbers between blanks.
 
 use super::Tables;
-use super::columns::Columns;
 use super::faces::{Faces, List};
-use super::header::{Element, Header, Kind};
-use super::roles::{Row, SLOTS};
-use super::scalar::Scalar;
+use super::header::Header;
 use crate::error::quoted;
 use crate::source::Source;
+use crate::table::{Columns, Element, Kind, Row, SLOTS, Scalar};
 use crate::{Error, Place};
 use std::io::Read;
 

@@ -1,12 +1,10 @@
 //! Tables in binary, either endian.
 
 use super::Tables;
-use super::columns::Columns;
 use super::faces::{Faces, List};
-use super::header::{Element, Header, Kind};
-use super::roles::{Row, SLOTS};
-use super::scalar::Scalar;
+use super::header::Header;
 use crate::source::Source;
+use crate::table::{Columns, Element, Kind, Row, SLOTS, Scalar};
 use crate::{Error, Place};
 use std::io::Read;
 

@@ -1,19 +1,19 @@
 //! From the rows of a table of points to a cloud.
 
-use super::header::{Element, Header};
+use super::Element;
 use super::roles::{
-    AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, Row, SIZE, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
+    AREA, COLOR, FIELDS, NORMAL, OPACITY, POSITION, Roles, Row, SIZE, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
 };
 use super::scalar::Scalar;
 use super::tone::Tone;
 use crate::{Error, Usage};
 use glam::{DVec3, Vec2, Vec3};
-use splat_core::{Cloud, Shapes, TextureCoordinates};
+use splat_core::{Cloud, Field, Shapes, TextureCoordinates};
 use std::collections::TryReserveError;
 use std::path::Path;
 
 /// A cloud half read, and how its columns are filled.
-pub(super) struct Columns {
+pub(crate) struct Columns {
     pub roles: Roles,
     /// Number of rows to come.
     count: usize,
@@ -29,10 +29,20 @@ pub(super) struct Columns {
     areas: Option<Vec<f32>>,
     tangents: Option<Vec<[Vec3; 2]>>,
     texture_coordinates: Option<Vec<TextureCoordinates>>,
+    fields: Vec<Field>,
+}
+
+/// What a file says of its points as a whole.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Hints {
+    /// Whether the normals are oriented.
+    pub oriented: Option<bool>,
+    /// The cloud's origin; finite.
+    pub origin: Option<DVec3>,
 }
 
 /// What became of the columns.
-pub(super) struct Outcome {
+pub(crate) struct Outcome {
     pub cloud: Cloud,
     /// Per property of the element.
     pub usages: Vec<Usage>,
@@ -70,10 +80,16 @@ impl Columns {
             areas: kinds[AREA].map(|_| Vec::new()),
             tangents: kinds[TANGENTS.start].map(|_| Vec::new()),
             texture_coordinates: kinds[TEXTURE.start].map(|_| Vec::new()),
+            fields: roles
+                .field_names
+                .iter()
+                .map(|name| Field { name: name.clone(), values: Vec::new() })
+                .collect(),
             roles,
         }
     }
 
+    /// Makes room for rows.
     fn reserve(&mut self, count: u64) -> Result<(), TryReserveError> {
         fn room<T>(column: &mut Option<Vec<T>>, count: usize) -> Result<(), TryReserveError> {
             column.as_mut().map_or(Ok(()), |column| column.try_reserve_exact(count))
@@ -86,7 +102,8 @@ impl Columns {
         room(&mut self.sizes, self.count)?;
         room(&mut self.areas, self.count)?;
         room(&mut self.tangents, self.count)?;
-        room(&mut self.texture_coordinates, self.count)
+        room(&mut self.texture_coordinates, self.count)?;
+        self.fields.iter_mut().try_for_each(|field| field.values.try_reserve_exact(self.count))
     }
 
     /// Number of rows that were claimed.
@@ -131,13 +148,16 @@ impl Columns {
             let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
             coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
         }
+        for (field, value) in self.fields.iter_mut().zip(&row[FIELDS..]) {
+            field.values.push(*value as f32);
+        }
     }
 
     /// Makes the cloud and says what was assumed.
-    pub fn finish(mut self, header: &Header) -> Outcome {
+    pub fn finish(mut self, hints: Hints) -> Outcome {
         let mut assumptions = Vec::new();
         self.drop_zero_normals(&mut assumptions);
-        let mut cloud = located(&self.positions, header.origin);
+        let mut cloud = located(&self.positions, hints.origin);
         let count = cloud.len();
 
         if cloud.origin != DVec3::ZERO {
@@ -145,7 +165,7 @@ impl Columns {
             assumptions
                 .push(format!("the points lie far from zero: they are kept relative to ({x}, {y}, {z})"));
         }
-        cloud.oriented = self.normals.is_some() && header.oriented != Some(false);
+        cloud.oriented = self.normals.is_some() && hints.oriented != Some(false);
         assumptions.push(match (&self.normals, cloud.oriented) {
             (None, _) => "no normals: they are unknown".to_owned(),
             (Some(_), true) => "the normals are taken as oriented: they point outwards".to_owned(),
@@ -175,6 +195,7 @@ impl Columns {
         cloud.opacities = self.opacities;
         cloud.areas = self.areas;
         cloud.texture_coordinates = self.texture_coordinates;
+        cloud.fields = self.fields;
         Outcome { cloud, usages: self.roles.usages, assumptions, color_assumptions }
     }
 
