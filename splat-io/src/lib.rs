@@ -8,29 +8,41 @@
 
 pub mod atomic;
 pub mod camera_json;
+pub mod cloud_file;
+#[cfg(test)]
+mod damage;
+mod decimals;
 pub mod error;
 pub mod exr_file;
 pub mod import;
+pub mod las;
 pub mod mesh;
 pub mod metadata;
+pub mod pcd;
 pub mod picture;
 pub mod ply;
 pub mod png_file;
 mod source;
 pub mod srgb;
 mod table;
+pub mod text;
 pub mod texture_file;
+mod whole_file;
 
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
+pub use cloud_file::{CloudFormat, CloudOptions, cloud_format, read_cloud};
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
+pub use las::{read_las, read_las_from, write_las};
 pub use mesh::{Mesh, MeshImport, Sampled, read_obj, sample_surface};
 pub use metadata::Metadata;
+pub use pcd::{read_pcd, read_pcd_from};
 pub use picture::{PictureFormat, write_picture};
 pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::write_png;
+pub use text::{read_text, read_text_from};
 pub use texture_file::{read_pyramid, read_pyramid_from};

@@ -5,9 +5,10 @@ mod roles;
 mod scalar;
 mod tone;
 
-pub(crate) use columns::{Columns, Hints, Outcome};
+pub(crate) use columns::{Columns, Hints, Outcome, far_from_zero};
 pub(crate) use roles::{Row, SLOTS};
 pub(crate) use scalar::Scalar;
+pub(crate) use tone::Tone;
 
 /// A table.
 #[derive(Debug)]

@@ -160,11 +160,7 @@ impl Columns {
         let mut cloud = located(&self.positions, hints.origin);
         let count = cloud.len();
 
-        if cloud.origin != DVec3::ZERO {
-            let DVec3 { x, y, z } = cloud.origin;
-            assumptions
-                .push(format!("the points lie far from zero: they are kept relative to ({x}, {y}, {z})"));
-        }
+        assumptions.extend(far_from_zero(&cloud));
         cloud.oriented = self.normals.is_some() && hints.oriented != Some(false);
         assumptions.push(match (&self.normals, cloud.oriented) {
             (None, _) => "no normals: they are unknown".to_owned(),
@@ -234,6 +230,13 @@ impl Columns {
             assumptions.push(format!("{count} opacities outside [0, 1] are clamped"));
         }
     }
+}
+
+/// What is said of a cloud with an origin of its own.
+pub(crate) fn far_from_zero(cloud: &Cloud) -> Option<String> {
+    let DVec3 { x, y, z } = cloud.origin;
+    (cloud.origin != DVec3::ZERO)
+        .then(|| format!("the points lie far from zero: they are kept relative to ({x}, {y}, {z})"))
 }
 
 /// Bare points, relative to the origin that a comment gives if that keeps every position exactly, otherwise

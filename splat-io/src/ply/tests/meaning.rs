@@ -241,10 +241,7 @@ fn the_report_tells_all() {
         report.assumptions.contains(&"element face (2 rows) is ignored: only points are drawn".to_owned())
     );
     assert_eq!(report.elements[0].properties[3].kind, "uchar");
-    assert_eq!(
-        report.elements[0].properties[3].usage.to_string(),
-        "scalar field"
-    );
+    assert_eq!(report.elements[0].properties[3].usage.to_string(), "scalar field");
 }
 
 #[test]
