@@ -5,7 +5,7 @@ use crate::inputs::{self, Reading, Sampling};
 use crate::progress::Progress;
 use crate::usage::UsageError;
 use crate::{console::Console, output};
-use splat_io::{PlyEncoding, write_ply};
+use splat_io::{CloudTarget, PlyEncoding, write_cloud};
 use std::time::Instant;
 
 /// Runs the command.
@@ -17,14 +17,16 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
     let console: Console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let path = &arguments.output;
-    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("ply")) {
-        return Err(UsageError::new(format!("{}: expected a name that ends in .ply", path.display())).into());
-    }
+    let Some(target) = CloudTarget::of(path) else {
+        let known = CloudTarget::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ");
+        let message = format!("{}: expected a name that ends in one of {known}", path.display());
+        return Err(UsageError::new(message).into());
+    };
     output::check_file(path)?;
 
     let sampling = Sampling { points: arguments.points, seed: arguments.seed };
-    let reading = Reading { sampling, with_faces: true };
-    let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
+    let reading = Reading::new(sampling, true, &arguments.reading);
+    let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     let (cloud, reports) = input?;
     for report in &reports {
         for assumption in &report.assumptions {
@@ -32,8 +34,10 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
         }
     }
     let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
-    let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));
-    written?;
+    let (written, _) = progress.stage("write", |_| write_cloud(path, &cloud, target, encoding));
+    for note in written? {
+        console.warn(format_args!("{}: {note}", path.display()));
+    }
     let seconds = start.elapsed().as_secs_f64();
     console.summary(format_args!("{}: {} points, {seconds:.1} s", path.display(), cloud.len()));
     Ok(())

@@ -7,6 +7,7 @@
 
 mod arguments;
 mod choices;
+mod colors;
 mod console;
 mod convert;
 mod demo;

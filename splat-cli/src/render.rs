@@ -8,7 +8,7 @@ use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{describe, inputs, material, output, resolve};
+use crate::{colors, describe, inputs, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -33,11 +33,12 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
     let images = material::read(&arguments.material, console)?;
-    let reading = Reading { sampling: Sampling::default(), with_faces: false };
-    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
+    let reading = Reading::new(Sampling::default(), false, &arguments.reading);
+    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     times.read = time;
     let (mut cloud, reports) = input?;
     note_assumptions(console, &cloud, &reports);
+    let color = colors::choose(&cloud, &arguments.splats)?;
     let camera_path = arguments.camera.camera.as_deref();
     let camera = camera_path.map(|path| read_camera_json(path, resolve::default_near(&cloud))).transpose()?;
 
@@ -51,14 +52,16 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     });
     times.prepare = time;
     inputs::check_usable(&cloud, &reports)?;
-    let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
     let up = resolve::up(&arguments.camera, &cloud);
+    let color = color.map(|choice| colors::apply(&mut cloud, choice, &arguments.splats, up, console));
+    let color = color.transpose()?.unwrap_or_default();
+    let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
     options.material = material::material(&arguments.material, images, &cloud, up)?;
     options.check()?;
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-    let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
+    let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + &color;
     if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
         in_words += &format!(" --light {azimuth},{elevation}");
     }

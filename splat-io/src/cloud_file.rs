@@ -1,11 +1,12 @@
 //! Clouds of any format behind one door.
 
-use crate::las::read_las_from;
+use crate::las::{self, read_las_from, write_las};
 use crate::pcd::read_pcd_from;
-use crate::ply::{open, read_ply};
-use crate::text::read_text_from;
+use crate::ply::{PlyEncoding, open, read_ply, write_ply};
+use crate::text::{read_text_from, write_text};
 use crate::whole_file::read_whole;
 use crate::{Error, Import};
+use splat_core::{Cloud, Field, Shapes};
 use std::io::Read;
 use std::path::Path;
 
@@ -81,6 +82,91 @@ fn begins_pcd(head: &[u8]) -> bool {
     first.is_some_and(|line| {
         [&b"VERSION "[..], b"FIELDS ", b"COLUMNS "].iter().any(|key| line.starts_with(key))
     })
+}
+
+/// What a cloud can be written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CloudTarget {
+    /// [`write_ply`].
+    Ply,
+    /// [`write_las`].
+    Las,
+    /// [`write_las`], compressed.
+    Laz,
+    /// [`write_text`], with blanks.
+    Text,
+    /// [`write_text`], with commas.
+    Csv,
+}
+
+impl CloudTarget {
+    /// The extensions of file names.
+    pub const EXTENSIONS: [(&'static str, Self); 7] = [
+        ("ply", Self::Ply),
+        ("las", Self::Las),
+        ("laz", Self::Laz),
+        ("xyz", Self::Text),
+        ("txt", Self::Text),
+        ("asc", Self::Text),
+        ("csv", Self::Csv),
+    ];
+
+    /// What the name of a file says.
+    pub fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?;
+        let mut known = Self::EXTENSIONS.into_iter();
+        known.find(|(known, _)| extension.eq_ignore_ascii_case(known)).map(|(_, target)| target)
+    }
+
+    /// What of a cloud the format has no place for.
+    fn lacks(self, cloud: &Cloud) -> Vec<&'static str> {
+        let is_ellipses = matches!(cloud.shapes, Shapes::Ellipses(_));
+        let has_sizes =
+            matches!(&cloud.shapes, Shapes::Discs(sizes) if sizes.iter().any(|&size| size != 0.0));
+        if self == Self::Ply {
+            return Vec::new();
+        }
+        let in_las = matches!(self, Self::Las | Self::Laz);
+        let known = |field: &Field| las::FIELD_NAMES.iter().any(|name| field.name.eq_ignore_ascii_case(name));
+        let lacks = [
+            (in_las && !cloud.normals.is_empty(), "normals"),
+            (is_ellipses || (in_las && has_sizes), "sizes"),
+            (in_las && cloud.opacities.is_some(), "opacities"),
+            (cloud.areas.is_some(), "areas"),
+            (cloud.texture_coordinates.is_some(), "texture coordinates"),
+            (in_las && !cloud.fields.iter().all(known), "fields that are none of LAS"),
+        ];
+        lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect()
+    }
+}
+
+/// Writes a cloud. Says what could not be written, a sentence each.
+///
+/// # Errors
+/// Those of the format's writer.
+pub fn write_cloud(
+    path: &Path,
+    cloud: &Cloud,
+    target: CloudTarget,
+    encoding: PlyEncoding,
+) -> Result<Vec<String>, Error> {
+    let mut notes = Vec::new();
+    match target {
+        CloudTarget::Ply => write_ply(path, cloud, encoding)?,
+        CloudTarget::Las | CloudTarget::Laz => {
+            let left_out = write_las(path, cloud, target == CloudTarget::Laz)?;
+            if left_out > 0 {
+                notes.push(format!("{left_out} points without finite coordinates are left out"));
+            }
+        }
+        CloudTarget::Text => write_text(path, cloud, ' ')?,
+        CloudTarget::Csv => write_text(path, cloud, ',')?,
+    }
+    let lacks = target.lacks(cloud);
+    if !lacks.is_empty() {
+        notes.push(format!("the format has no place for {}", lacks.join(", ")));
+    }
+    Ok(notes)
 }
 
 #[cfg(test)]

@@ -31,6 +31,17 @@ use header::Header;
 use points::Points;
 use std::path::Path;
 
+/// The names of the scalar fields that LAS files can be written with.
+pub(crate) const FIELD_NAMES: [&str; 7] = [
+    "intensity",
+    "return_number",
+    "number_of_returns",
+    "classification",
+    "scan_angle",
+    "user_data",
+    "point_source_id",
+];
+
 /// Reads a cloud from a LAS or LAZ file. See the [module](self) for what is understood.
 ///
 /// # Errors

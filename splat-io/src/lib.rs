@@ -31,7 +31,7 @@ mod whole_file;
 
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
-pub use cloud_file::{CloudFormat, CloudOptions, cloud_format, read_cloud};
+pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
@@ -44,5 +44,5 @@ pub use ply::{
     PlyEncoding, ply_has_faces, read_ply, read_ply_from, read_ply_mesh, read_ply_mesh_from, write_ply,
 };
 pub use png_file::write_png;
-pub use text::{read_text, read_text_from};
+pub use text::{read_text, read_text_from, write_text};
 pub use texture_file::{read_pyramid, read_pyramid_from};

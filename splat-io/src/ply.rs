@@ -33,7 +33,7 @@ mod faces;
 mod header;
 #[cfg(test)]
 pub(crate) mod tests;
-mod writer;
+pub(crate) mod writer;
 
 pub use writer::{PlyEncoding, write_ply};
 

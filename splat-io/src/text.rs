@@ -11,6 +11,9 @@
 mod layout;
 #[cfg(test)]
 mod tests;
+mod writer;
+
+pub use writer::write_text;
 
 use crate::error::quoted;
 use crate::table::{Columns, Element, Hints, Kind, Outcome, Property, Row, SLOTS, Scalar, Tone};

@@ -148,3 +148,33 @@ fn no_damage_makes_a_panic() {
         _ = read_text_from(&damaged, Path::new("a.txt"), None);
     }
 }
+
+#[test]
+fn what_is_written_reads_back() {
+    let levels = crate::srgb::linear_from_srgb8();
+    let points: Vec<_> = (0..50)
+        .map(|i| glam::DVec3::new(6e5 + f64::from(i) * 0.37, 5e6 - f64::from(i) / 4.0, 0.01))
+        .collect();
+    let mut cloud = Cloud::from_points(&points);
+    cloud.colors =
+        Some((0..50).map(|i| Vec3::new(levels[i], levels[255 - i], levels[7 * i % 256])).collect());
+    cloud.normals = vec![Vec3::new(0.6, 0.0, -0.8); 50];
+    cloud.oriented = true;
+    cloud.shapes = splat_core::Shapes::Discs((0..50).map(|i| i as f32 * 0.1).collect());
+    let values = (0..50).map(|i| 1.0 / i as f32).collect();
+    cloud.fields = vec![splat_core::Field { name: "gps,time".to_owned(), values }];
+    let folder = tempfile::tempdir().unwrap();
+    for (name, separator) in [("a.xyz", ' '), ("a.csv", ',')] {
+        let path = folder.path().join(name);
+        write_text(&path, &cloud, separator).unwrap();
+        let mut again = read_text(&path, None).unwrap().cloud;
+        assert_eq!(again.fields[0].name, "gps_time");
+        again.fields[0].name = "gps,time".to_owned();
+        assert_eq!(again, cloud);
+    }
+    let text = std::fs::read_to_string(folder.path().join("a.xyz")).unwrap();
+    assert!(
+        text.starts_with("# x y z r g b nx ny nz radius gps_time\n600000.00 5000000.00 0.01 0 255 0 0.6"),
+        "{text}"
+    );
+}
