@@ -9,7 +9,7 @@ const MOST: i32 = 9;
 /// takes more than the rounding leaves.
 ///
 /// Surveys are kept in whole centimetres or millimetres: so they can be written as they were read.
-pub(crate) fn decimals(cloud: &Cloud) -> Option<i32> {
+pub fn decimals(cloud: &Cloud) -> Option<i32> {
     (0..=MOST).find(|&k| {
         let power = 10_f64.powi(k);
         cloud.positions.iter().filter(|position| position.is_finite()).all(|position| {

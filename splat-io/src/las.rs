@@ -9,7 +9,7 @@
 //! |---|---|
 //! | X, Y, Z | position |
 //! | red, green, blue | colour: sRGB, 8-bit if no value of the file is above 255, else 16-bit; absent if all are 0 |
-//! | intensity, classification, return number, number of returns, scan angle, user data, point source, near infrared | scalar fields; one that is 0 everywhere is left out |
+//! | intensity, classification, return number, number of returns, scan angle, user data, point source, near infrared | scalar fields; one that is 0 everywhere is left out, and so are returns that are all 1 |
 //! | synthetic, key-point, withheld, overlap | counted in the report; the points are kept |
 //! | GPS time, wave packets, extra bytes | not read |
 //!

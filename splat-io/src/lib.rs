@@ -11,7 +11,7 @@ pub mod camera_json;
 pub mod cloud_file;
 #[cfg(test)]
 mod damage;
-mod decimals;
+pub mod decimals;
 pub mod error;
 pub mod exr_file;
 pub mod import;
@@ -32,6 +32,7 @@ mod whole_file;
 pub use atomic::AtomicFile;
 pub use camera_json::{parse_camera_json, read_camera_json, write_camera_json};
 pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
+pub use decimals::decimals;
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};

@@ -59,7 +59,7 @@ pub fn read_pcd_from(bytes: &[u8], path: &Path) -> Result<Import, Error> {
         assumptions
             .push(format!("the scanner's place ({x}, {y}, {z}) and turn ({w}, {i}, {j}, {k}) are not used"));
     }
-    if header.height > 1 {
+    if header.width > 1 && header.height > 1 {
         assumptions.push(format!("the cloud is a grid of {} x {} points", header.width, header.height));
     }
     let report = ImportReport {

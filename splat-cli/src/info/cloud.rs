@@ -5,7 +5,7 @@ use crate::values::Columns;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use splat_core::{Cloud, Field, Shapes};
-use splat_io::{CloudOptions, Import, ImportReport, Usage, read_cloud};
+use splat_io::{CloudOptions, Import, ImportReport, Usage, decimals, read_cloud};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ impl Summary {
             elements: elements.collect(),
             points: cloud.len(),
             finite: cloud.positions.iter().filter(|position| position.is_finite()).count(),
-            bounds: cloud.bounds().map(|(low, high)| [low.to_array(), high.to_array()]),
+            bounds: bounds(&cloud),
             diagonal: cloud.diagonal(),
             origin: cloud.origin.to_array(),
             normals: (!cloud.normals.is_empty()).then(|| normals(&cloud)),
@@ -145,6 +145,14 @@ impl FieldSummary {
             field.values.iter().filter(|value| value.is_finite()).map(|&value| f64::from(value)).collect();
         Self { name: field.name.clone(), range: spread(&finite) }
     }
+}
+
+/// Least and greatest corner, with the decimals that the coordinates have.
+fn bounds(cloud: &Cloud) -> Option<[[f64; 3]; 2]> {
+    let (low, high) = cloud.bounds()?;
+    let power = decimals(cloud).map(|decimals| 10_f64.powi(decimals));
+    let rounded = |coordinate: f64| power.map_or(coordinate, |power| (coordinate * power).round() / power);
+    Some([low, high].map(|corner| corner.to_array().map(rounded)))
 }
 
 fn normals(cloud: &Cloud) -> Normals {

@@ -42,6 +42,8 @@ pub(super) struct Header {
     pub axes: [Axis; 3],
     /// Where the variable length records are.
     records: Range<usize>,
+    /// Whether the points are in the order of an octree.
+    is_copc: bool,
 }
 
 impl Header {
@@ -98,7 +100,7 @@ impl Header {
             let what = format!("a cloud of {count} points");
             return Err(Error::limit(path, what, format!("{MOST_POINTS} points")));
         }
-        Ok(Self {
+        let mut header = Self {
             minor,
             format,
             is_compressed: bytes[104] & !0x3f & COMPRESSED != 0,
@@ -107,7 +109,10 @@ impl Header {
             data,
             axes,
             records: header_bytes..data,
-        })
+            is_copc: false,
+        };
+        header.is_copc = header.record(bytes, b"copc", 1).is_some();
+        Ok(header)
     }
 
     /// The data of a variable length record, found by its user and number. Records that do not fit are passed over, as
@@ -138,7 +143,8 @@ impl Header {
     /// The format in words.
     pub fn describe(&self) -> String {
         let name = if self.is_compressed { "LAZ" } else { "LAS" };
-        format!("{name} 1.{}, point format {}", self.minor, self.format)
+        let octree = if self.is_copc { ", an octree (COPC)" } else { "" };
+        format!("{name} 1.{}, point format {}{octree}", self.minor, self.format)
     }
 }
 

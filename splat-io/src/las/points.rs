@@ -151,11 +151,12 @@ impl Points {
             properties.extend(["red", "green", "blue"].map(|name| property(name, "uint16", usage)));
         }
         for ([name, kind], values) in FIELDS.into_iter().zip(self.fields) {
-            if values.iter().any(|&value| value != 0.0) {
+            let all = |number: f32| values.iter().all(|&value| value == number);
+            if !all(0.0) && !(name.contains("return") && all(1.0)) {
                 properties.push(property(name, kind, Usage::Field));
                 cloud.fields.push(Field { name: name.to_owned(), values });
             } else if name != "near_infrared" || self.infrared_at.is_some() {
-                properties.push(property(name, kind, Usage::Unused("zero everywhere")));
+                properties.push(property(name, kind, Usage::Unused("the same as if it were not there")));
             }
         }
         if header.extra_bytes() > 0 {
