@@ -14,7 +14,7 @@
 //! | GPS time, wave packets, extra bytes | not read |
 //!
 //! Uncompressed points are decoded here. Compressed ones go through the crate `laz`, chunk by chunk, after every
-//! size that the file claims was held against its own ([`mod@laz_points`]).
+//! size that the file claims was held against its own.
 
 mod header;
 mod laz_points;

@@ -2,7 +2,7 @@
 //!
 //! Numbers stand between blanks, tabs, commas or semicolons, with decimal points. What a column means is told by names, in
 //! a first line or in a comment before the points (`//X Y Z R G B`), as the properties of PLY files are; else by
-//! the values ([`mod@layout`]); or by the caller. Empty lines are passed over, and so are comments (`#`, `//`). A PTS
+//! the values; or by the caller. Empty lines are passed over, and so are comments (`#`, `//`). A PTS
 //! file begins with the number of its points, which is checked.
 //!
 //! Colours are sRGB, 0 to 255, or 0 to 1 or 0 to 65535 if that is what the greatest value of the file says. Columns without
@@ -105,8 +105,10 @@ pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> 
     element.count = read;
     let mut outcome = columns.finish(Hints::default());
     let tone = outcome.cloud.colors.as_deref_mut().map(linearise);
-    assumptions.extend(outcome.assumptions.drain(..));
+    assumptions.append(&mut outcome.assumptions);
     assumptions.extend(tone);
+    // What is said of colours there is not true of these, which are not linear.
+    assumptions.extend(outcome.color_assumptions.drain(..).filter(|line| line.contains("opacities")));
     let element = report(&names, &element, &outcome);
     let cloud: Cloud = outcome.cloud;
     let report = ImportReport {

@@ -152,7 +152,8 @@ impl Points {
         }
         for ([name, kind], values) in FIELDS.into_iter().zip(self.fields) {
             let all = |number: f32| values.iter().all(|&value| value == number);
-            if !all(0.0) && !(name.contains("return") && all(1.0)) {
+            let is_silent = all(0.0) || (name.contains("return") && all(1.0));
+            if !is_silent {
                 properties.push(property(name, kind, Usage::Field));
                 cloud.fields.push(Field { name: name.to_owned(), values });
             } else if name != "near_infrared" || self.infrared_at.is_some() {
