@@ -90,13 +90,11 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
     if cloud.areas.is_none() {
         assumptions.push("areas are estimated from neighbours".to_owned());
     }
-    match default_choice(cloud) {
-        Some(ColorChoice::Rgb) => {}
-        Some(_) => assumptions.push("there is no colour: the intensity is shown (--color)".to_owned()),
-        None => {
-            assumptions.push("there is no colour: a headlight shades the surfaces (--shading)".to_owned())
-        }
-    }
+    assumptions.extend(match default_choice(cloud) {
+        Some(ColorChoice::Rgb) => None,
+        Some(_) => Some("there is no colour: the intensity is shown (--color)".to_owned()),
+        None => Some("there is no colour: a headlight shades the surfaces (--shading)".to_owned()),
+    });
     assumptions
 }
 
