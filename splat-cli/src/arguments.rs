@@ -1,15 +1,15 @@
 //! The command line as it is written: raw options, before anything is known of the cloud.
 
 use crate::choices::{
-    CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice, FilterChoice, KernelChoice,
-    MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice, ShadingChoice, TableChoice,
-    TextureFilterChoice, UpChoice, WrapChoice,
+    ColorMapChoice, CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice,
+    FilterChoice, KernelChoice, MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice,
+    ShadingChoice, TableChoice, TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
 use crate::scene::Scene;
-use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
+use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
 use splat_core::{AovSelection, PixelRect};
 use std::ops::Range;
@@ -29,11 +29,12 @@ pub struct Arguments {
 pub enum Command {
     /// Render clouds and meshes to a picture
     Render(Box<RenderArguments>),
-    /// Make a cloud (.ply, .splat) from meshes and clouds
+    /// Make a cloud from meshes and clouds
     ///
     /// Meshes are covered evenly with surfels: an OBJ file, and a PLY file that has faces (which render takes for the cloud
     /// of its vertices). Each surfel has an area, a normal, axes and, where the mesh has them, colour and texture
-    /// coordinates. Clouds are written as they are, several as one; what they lack is estimated by render.
+    /// coordinates. Clouds are written as they are, several as one; what they lack is estimated by render, and what the format
+    /// has no place for is named.
     Convert(ConvertArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
@@ -44,10 +45,10 @@ pub enum Command {
 /// `splat convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Meshes (.obj, or .ply with faces) and clouds (.ply, .splat, .spz); several become one cloud
+    /// Meshes (.obj, or .ply with faces) and clouds (.ply, .las, .laz, .pcd, text, .splat, .spz); several become one cloud
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// The cloud: .ply, or .splat for viewers of trained splats
+    /// The cloud: .ply, .las, .laz, .xyz, .txt, .asc, .csv, or .splat for viewers of trained splats
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Surfels on each mesh
@@ -56,12 +57,27 @@ pub struct ConvertArguments {
     /// Seed of the surfels' places
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Write text instead of binary numbers
+    /// Write a PLY file as text instead of binary numbers
     #[arg(long)]
     pub ascii: bool,
+    /// How files are read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
+}
+
+/// How files are read.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReadArguments {
+    /// What the columns of text files are: x, y, z, r, g, b, nx, ny, nz, radius, the name of a field, or - for nothing
+    /// [default: what their names or values tell]
+    #[arg(long, value_name = "x,y,z,..", value_parser = values::columns, allow_hyphen_values = true)]
+    pub columns: Option<Columns>,
+    /// Only points of these classes, as 2,6 or, all but these, !7,18
+    #[arg(long, value_name = "LIST", value_parser = values::classes)]
+    pub classes: Option<Classes>,
 }
 
 /// Surfels on a mesh: one spacing is then below two pixels where the surface fills a picture of the default size.
@@ -70,8 +86,12 @@ pub const DEFAULT_POINTS: usize = 200_000;
 /// `splat info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
-    /// A cloud (.ply, .splat, .spz, points3D of COLMAP), a mesh (.obj) or cameras (.json, .log, a COLMAP folder)
+    /// A cloud (.ply, .las, .laz, .pcd, text, .splat, .spz, points3D of COLMAP), a mesh (.obj) or cameras (.json, .log, a
+    /// COLMAP folder)
     pub file: PathBuf,
+    /// What the columns of a text file are: see render
+    #[arg(long, value_name = "x,y,z,..", value_parser = values::columns, allow_hyphen_values = true)]
+    pub columns: Option<Columns>,
     /// Write JSON
     #[arg(long)]
     pub json: bool,
@@ -103,8 +123,8 @@ pub struct DemoArguments {
 /// `splat render`.
 #[derive(Debug, Args)]
 pub struct RenderArguments {
-    /// Clouds (.ply, .splat, .spz, a COLMAP folder or its points3D) and meshes (.obj, sampled as by convert), several as one;
-    /// or a scene file (.toml)
+    /// Clouds (.ply, .las, .laz, .pcd, text, .splat, .spz, COLMAP points) and meshes (.obj, sampled as by convert), several
+    /// as one; or a scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
     /// The picture: .exr (linear, all AOVs) or .png
@@ -116,6 +136,9 @@ pub struct RenderArguments {
     /// The scene file among the inputs, once it is read.
     #[arg(skip)]
     pub scene: Option<Scene>,
+    /// How files are read.
+    #[command(flatten, next_help_heading = "Input")]
+    pub reading: ReadArguments,
     /// From where.
     #[command(flatten, next_help_heading = "Camera")]
     pub camera: CameraArguments,
@@ -235,6 +258,16 @@ pub struct SplatArguments {
     /// Factor on all sizes, given and estimated
     #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
     pub radius_scale: f64,
+    /// What is shown as colour: rgb, intensity, height, normal, class, or the name of a scalar field
+    /// [default: rgb; where there is none, the intensity]
+    #[arg(long, value_name = "WHAT", value_parser = values::color)]
+    pub color: Option<ColorChoice>,
+    /// The colours of numbers [default: viridis; gray for the intensity]
+    #[arg(long, value_name = "MAP")]
+    pub colormap: Option<ColorMapChoice>,
+    /// The numbers at both ends of the colours [default: 2 % of the points lie below, and 2 % above]
+    #[arg(long, value_name = "LO:HI", value_parser = values::color_range, allow_hyphen_values = true)]
+    pub color_range: Option<[f64; 2]>,
     /// How light falls on splats
     #[arg(long, value_name = "SHADING", default_value = "auto", help_heading = "Light")]
     pub shading: ShadingChoice,
@@ -362,7 +395,8 @@ mod tests {
                     reference --threads 4 --seed 7 --quiet --progress json --stats - --shading lambert \
                     --light 30,-10 --texture t.png --mapping planar --texture-wrap clamp --texture-filter \
                     trilinear --max-anisotropy 8 --texture-detail splat --environment e.exr --reflect \
-                    --exr-type float --exr-compression piz";
+                    --exr-type float --exr-compression piz --columns x,y,z,- --classes !7,18 --color height \
+                    --colormap inferno --color-range -1:2.5";
         let arguments = render(line).unwrap();
         assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
         assert_eq!(arguments.samples.samples, Some(0..4));

@@ -169,6 +169,19 @@ impl ShadingChoice {
     }
 }
 
+/// `--colormap`: perceptually uniform, all but gray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ColorMapChoice {
+    /// Violet, green, yellow
+    Viridis,
+    /// Blue, grey, yellow: the same to the colour-blind
+    Cividis,
+    /// Black, red, yellow, white
+    Inferno,
+    /// Black to white
+    Gray,
+}
+
 /// `--mapping`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum MappingChoice {
@@ -372,6 +385,7 @@ mod tests {
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
         assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
         assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight", "lambert"]);
+        assert_eq!(words::<ColorMapChoice>(), ["viridis", "cividis", "inferno", "gray"]);
         assert_eq!(words::<MappingChoice>(), ["uv", "spherical", "cylindrical", "planar"]);
         assert_eq!(words::<WrapChoice>(), ["repeat", "clamp", "mirror", "black"]);
         let filters = ["trilinear", "ewa-printed", "ewa", "texram", "probes", "ewa-vc"];

@@ -7,7 +7,7 @@ use crate::usage::UsageError;
 use crate::{console::Console, output};
 use splat_core::Kernel;
 use splat_core::prepare::{PrepareOptions, prepare};
-use splat_io::{PlyEncoding, write_ply, write_splat};
+use splat_io::{CloudTarget, PlyEncoding, write_cloud};
 use std::time::Instant;
 
 /// What a `.splat` file needs of a cloud: normals and sizes.
@@ -23,36 +23,29 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
     let console: Console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let path = &arguments.output;
-    let has_extension =
-        |name: &str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(name));
-    if !has_extension("ply") && !has_extension("splat") {
-        let message = format!("{}: expected a name that ends in .ply or .splat", path.display());
+    let Some(target) = CloudTarget::of(path) else {
+        let known = CloudTarget::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ");
+        let message = format!("{}: expected a name that ends in one of {known}", path.display());
         return Err(UsageError::new(message).into());
-    }
+    };
     output::check_file(path)?;
 
     let sampling = Sampling { points: arguments.points, seed: arguments.seed };
-    let reading = Reading { sampling, with_faces: true };
-    let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
+    let reading = Reading::new(sampling, true, &arguments.reading);
+    let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     let (mut cloud, reports) = input?;
     for report in &reports {
         for assumption in &report.assumptions {
             console.note(format_args!("{}: {assumption}", report.path.display()));
         }
     }
-    if cloud.harmonics.is_some() {
-        console.warn(format_args!("{}: colours no longer depend on the view", path.display()));
-    }
-    if has_extension("splat") {
+    if target == CloudTarget::Splat {
         progress.stage("prepare", |_| prepare(&mut cloud, &FOR_SPLATS));
-        let (written, _) = progress.stage("write", |_| write_splat(path, &cloud));
-        if let skipped @ 1.. = written? {
-            console.warn(format_args!("{}: {skipped} points left out that cannot be drawn", path.display()));
-        }
-    } else {
-        let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
-        let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));
-        written?;
+    }
+    let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
+    let (written, _) = progress.stage("write", |_| write_cloud(path, &cloud, target, encoding));
+    for note in written? {
+        console.warn(format_args!("{}: {note}", path.display()));
     }
     let seconds = start.elapsed().as_secs_f64();
     console.summary(format_args!("{}: {} points, {seconds:.1} s", path.display(), cloud.len()));

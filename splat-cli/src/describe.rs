@@ -1,6 +1,8 @@
 //! Options and assumptions in words.
 
+use crate::colors::default_choice;
 use crate::resolve::assumed_up;
+use crate::values::ColorChoice;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::fit::Up;
 use splat_core::{Cloud, Kernel, PatternKind, PixelFilter, RenderOptions, Shading, Shapes, TableMode};
@@ -96,9 +98,11 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
     } else if cloud.areas.is_none() {
         assumptions.push("areas are estimated from neighbours".to_owned());
     }
-    if cloud.colors.is_none() {
-        assumptions.push("there is no colour: a headlight shades the surfaces (--shading)".to_owned());
-    }
+    assumptions.extend(match default_choice(cloud) {
+        Some(ColorChoice::Rgb) => None,
+        Some(_) => Some("there is no colour: the intensity is shown (--color)".to_owned()),
+        None => Some("there is no colour: a headlight shades the surfaces (--shading)".to_owned()),
+    });
     assumptions
 }
 

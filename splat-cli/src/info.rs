@@ -20,7 +20,7 @@ pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
         let summary = mesh::Summary::read(&arguments.file)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else {
-        let summary = cloud::Summary::read(&arguments.file)?;
+        let summary = cloud::Summary::read(&arguments.file, arguments.columns.as_ref())?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     };
     Ok(console::data(&if arguments.json { json + "\n" } else { text })?)

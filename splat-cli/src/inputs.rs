@@ -1,13 +1,15 @@
 //! The clouds and meshes of the command line, read and joined into one cloud.
 
 use crate::arguments::DEFAULT_POINTS;
+use crate::arguments::ReadArguments;
+use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
 use glam::{DVec3, Vec3};
 use splat_core::harmonics::{constant_term, terms};
-use splat_core::{Cloud, Shapes, SphericalHarmonics, srgb};
+use splat_core::{Cloud, Field, Shapes, SphericalHarmonics, srgb};
 use splat_io::{
-    Import, ImportReport, MeshImport, Sampled, ply_has_faces, points3d::find_points3d, read_obj, read_ply,
-    read_ply_mesh, read_points3d, read_trained, sample_surface,
+    CloudFormat, CloudOptions, Import, ImportReport, MeshImport, Sampled, cloud_format, ply_has_faces,
+    read_cloud, read_obj, read_ply_mesh, sample_surface,
 };
 use std::path::{Path, PathBuf};
 
@@ -27,12 +29,24 @@ impl Default for Sampling {
 }
 
 /// What files are read as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reading {
     /// How meshes are sampled.
     pub sampling: Sampling,
     /// Whether a PLY file with faces is a mesh; else it is the cloud of its vertices.
     pub with_faces: bool,
+    /// What a file may not say of itself.
+    pub cloud: CloudOptions,
+    /// The classes of points that are wanted; `None`: all.
+    pub classes: Option<Classes>,
+}
+
+impl Reading {
+    /// What the options ask for.
+    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments) -> Self {
+        let columns = arguments.columns.as_ref().map(|columns| columns.0.clone());
+        Self { sampling, with_faces, cloud: CloudOptions { columns }, classes: arguments.classes.clone() }
+    }
 }
 
 /// Reads clouds and meshes and joins them: the first file's splats come first. `progress` is told the share done, 0 to 1.
@@ -41,7 +55,7 @@ pub struct Reading {
 /// What the readers say; meshes without an area; clouds that do not go together.
 pub fn read(
     paths: &[PathBuf],
-    reading: Reading,
+    reading: &Reading,
     progress: &mut dyn FnMut(f64),
 ) -> anyhow::Result<(Cloud, Vec<ImportReport>)> {
     let one = |(index, path): (usize, &PathBuf)| {
@@ -51,7 +65,36 @@ pub fn read(
     let (clouds, reports): (Vec<Cloud>, Vec<ImportReport>) =
         imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
     let named: Vec<(&Path, Cloud)> = reports.iter().map(|report| report.path.as_path()).zip(clouds).collect();
-    Ok((join(named)?, reports))
+    let mut cloud = join(named)?;
+    if let Some(classes) = &reading.classes {
+        let field = cloud.field("classification").context("--classes: the points have no classification")?;
+        let kept: Vec<usize> = (0..cloud.len()).filter(|&index| classes.has(field.values[index])).collect();
+        cloud = only(&cloud, &kept);
+    }
+    Ok((cloud, reports))
+}
+
+/// The cloud of some of a cloud's splats.
+fn only(cloud: &Cloud, kept: &[usize]) -> Cloud {
+    fn pick<T: Copy>(values: &[T], kept: &[usize]) -> Vec<T> {
+        if values.is_empty() { Vec::new() } else { kept.iter().map(|&index| values[index]).collect() }
+    }
+    let field = |field: &Field| Field { name: field.name.clone(), values: pick(&field.values, kept) };
+    Cloud {
+        origin: cloud.origin,
+        positions: pick(&cloud.positions, kept),
+        normals: pick(&cloud.normals, kept),
+        shapes: match &cloud.shapes {
+            Shapes::Discs(sizes) => Shapes::Discs(pick(sizes, kept)),
+            Shapes::Ellipses(axes) => Shapes::Ellipses(pick(axes, kept)),
+        },
+        colors: cloud.colors.as_ref().map(|values| pick(values, kept)),
+        opacities: cloud.opacities.as_ref().map(|values| pick(values, kept)),
+        areas: cloud.areas.as_ref().map(|values| pick(values, kept)),
+        texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, kept)),
+        oriented: cloud.oriented,
+        fields: cloud.fields.iter().map(field).collect(),
+    }
 }
 
 /// Whether a file is an OBJ mesh, by its name.
@@ -60,28 +103,13 @@ pub fn is_obj(path: &Path) -> bool {
 }
 
 /// Reads a cloud, or a mesh as a cloud.
-fn read_one(path: &Path, reading: Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
+fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     if is_obj(path) {
         sampled(read_obj(path)?, reading.sampling, progress)
-    } else if let Some(points) = find_points3d(path) {
-        Ok(read_points3d(&points)?)
-    } else if let Some(import) = read_trained(path)? {
-        Ok(import)
-    } else if reading.with_faces && ply_has_faces(path)? {
+    } else if reading.with_faces && cloud_format(path)? == CloudFormat::Ply && ply_has_faces(path)? {
         sampled(read_ply_mesh(path)?, reading.sampling, progress)
     } else {
-        Ok(read_ply(path)?)
-    }
-}
-
-/// Reads a cloud of any format.
-pub fn read_cloud(path: &Path) -> Result<Import, splat_io::Error> {
-    if let Some(points) = find_points3d(path) {
-        return read_points3d(&points);
-    }
-    match read_trained(path)? {
-        Some(import) => Ok(import),
-        None => read_ply(path),
+        Ok(read_cloud(path, &reading.cloud)?)
     }
 }
 
@@ -112,7 +140,8 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
 /// Joins clouds, each with its name for messages.
 ///
 /// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
-/// told from another. Missing opacities are opaque; colours that do not depend on the view stay so; areas and texture coordinates are kept only if every cloud has them.
+/// told from another. Missing opacities are opaque; colours that do not depend on the view stay so; areas, texture
+/// coordinates and scalar fields are kept only if every cloud has them.
 fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
     if clouds.len() > 1 {
         clouds.retain(|(_, cloud)| !cloud.is_empty());
@@ -136,6 +165,12 @@ fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
         clouds.iter().map(|(_, cloud)| cloud.areas.clone()).collect::<Option<Vec<_>>>().map(|a| a.concat());
     let coordinates = clouds.iter().map(|(_, cloud)| cloud.texture_coordinates.clone());
     joined.texture_coordinates = coordinates.collect::<Option<Vec<_>>>().map(|parts| parts.concat());
+    let fields = clouds[0].1.fields.iter().filter_map(|Field { name, .. }| {
+        let parts: Option<Vec<_>> =
+            clouds.iter().map(|(_, cloud)| cloud.field(name).map(|field| field.values.as_slice())).collect();
+        Some(Field { name: name.clone(), values: parts?.concat() })
+    });
+    joined.fields = fields.collect();
     joined.oriented = clouds.iter().all(|(_, cloud)| cloud.oriented);
     let discs = all_or_none(&clouds, "round splats", |cloud| match &cloud.shapes {
         Shapes::Discs(sizes) => Some(sizes.clone()),
@@ -230,9 +265,14 @@ mod tests {
     #[test]
     fn clouds_are_joined_in_order_and_far_from_zero() {
         let (first, second) = (DVec3::new(5e5, 5e6, 0.0), DVec3::new(5e5, 5e6, 9.0));
+        let field = |name: &str, values: &[f32]| Field { name: name.to_owned(), values: values.to_vec() };
         let mut other = cloud(second, 3);
         other.opacities = Some(vec![0.5; 3]);
-        let all = joined(vec![cloud(first, 2), other]).unwrap();
+        other.fields = vec![field("time", &[0.0; 3]), field("Intensity", &[3.0, 4.0, 5.0])];
+        let mut one = cloud(first, 2);
+        one.fields = vec![field("intensity", &[1.0, 2.0]), field("class", &[0.0; 2])];
+        let all = joined(vec![one, other]).unwrap();
+        assert_eq!(all.fields, [field("intensity", &[1.0, 2.0, 3.0, 4.0, 5.0])]);
         assert!(all.check_lengths().is_ok() && all.oriented);
         assert_eq!(all.world_position(1), first + DVec3::X);
         assert_eq!(all.world_position(2), second);
@@ -246,6 +286,18 @@ mod tests {
         assert_eq!(joined(vec![one.clone()]).unwrap(), one);
         assert_eq!(joined(vec![Cloud::default(), one.clone()]).unwrap(), one);
         assert_eq!(joined(vec![Cloud::default(), Cloud::default()]).unwrap(), Cloud::default());
+    }
+
+    #[test]
+    fn some_of_a_cloud_is_a_cloud() {
+        let mut whole = cloud(DVec3::new(5e5, 5e6, 0.0), 4);
+        whole.colors = Some((0..4).map(|i| Vec3::splat(i as f32)).collect());
+        whole.fields = vec![Field { name: "classification".to_owned(), values: vec![2.0, 7.0, 6.0, 18.0] }];
+        let some = only(&whole, &[0, 2]);
+        assert!(some.check_lengths().is_ok());
+        assert_eq!(some.world_position(1), whole.world_position(2));
+        assert_eq!(some.fields[0].values, [2.0, 6.0]);
+        assert_eq!(only(&whole, &[0, 1, 2, 3]), whole);
     }
 
     #[test]

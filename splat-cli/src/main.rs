@@ -8,6 +8,7 @@
 mod arguments;
 mod cameras;
 mod choices;
+mod colors;
 mod console;
 mod convert;
 mod demo;

@@ -9,7 +9,7 @@ use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{self, Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{describe, frames, inputs, map, material, output, resolve};
+use crate::{colors, describe, frames, inputs, map, material, output, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -34,12 +34,13 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
     let images = material::read(&arguments.material, console)?;
-    let reading = Reading { sampling: Sampling::default(), with_faces: false };
-    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, reading, update));
+    let reading = Reading::new(Sampling::default(), false, &arguments.reading);
+    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     times.read = time;
     let (mut cloud, reports) = input?;
     let options = resolve::options(arguments, cloud.trained)?;
     note_assumptions(console, &cloud, &reports);
+    let color = colors::choose(&cloud, &arguments.splats)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
 
     let ((), time) = progress.stage("prepare", |_| {
@@ -53,6 +54,8 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     times.prepare = time;
     inputs::check_usable(&cloud, &reports)?;
     let up = resolve::up(&arguments.camera, &cloud);
+    let color = color.map(|choice| colors::apply(&mut cloud, choice, &arguments.splats, up, console));
+    let color = color.transpose()?.unwrap_or_default();
     let material = material::material(&arguments.material, images, &cloud, up)?;
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
     let fitted = is_fitted.then(|| Fitted::new(arguments, &cloud, &options)).transpose()?;
@@ -65,8 +68,15 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
         let options = RenderOptions { material: material.clone().into(), ..options };
         options.check()?;
-        let picture =
-            Picture { arguments, cloud: &cloud, reports: &reports, camera, options, path: shot.output };
+        let picture = Picture {
+            arguments,
+            cloud: &cloud,
+            reports: &reports,
+            color: &color,
+            camera,
+            options,
+            path: shot.output,
+        };
         let progress = progress.frame(number, count);
         statistics.push(picture.make(&mut engine, &progress, &mut times, start)?);
     }
@@ -81,6 +91,8 @@ struct Picture<'a> {
     arguments: &'a RenderArguments,
     cloud: &'a Cloud,
     reports: &'a [ImportReport],
+    /// What is shown as colour, in words.
+    color: &'a str,
     camera: Camera,
     options: RenderOptions,
     path: PathBuf,
@@ -95,11 +107,11 @@ impl Picture<'_> {
         times: &mut Times,
         start: Instant,
     ) -> anyhow::Result<Report> {
-        let Self { arguments, cloud, reports, camera, options, path } = self;
+        let Self { arguments, cloud, reports, color, camera, options, path } = self;
         let console = arguments.talk.console();
         let rendered = engine.render(cloud, &camera, &options, progress, console)?;
         let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
-        let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
+        let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;
         if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
             in_words += &format!(" --light {azimuth},{elevation}");
         }

@@ -23,6 +23,79 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text, "a finite number greater than 0", |value| value.is_finite() && value > 0.0)
 }
 
+/// `--columns`: what the columns of a text are, in their order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns(pub Vec<String>);
+
+/// `--columns`.
+pub fn columns(text: &str) -> Result<Columns, String> {
+    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    let is_there = |place: &str| names.iter().any(|name| name.eq_ignore_ascii_case(place));
+    if ["x", "y", "z"].into_iter().all(is_there) && names.iter().all(|name| !name.is_empty()) {
+        Ok(Columns(names))
+    } else {
+        Err("expected names between commas, x, y and z among them".to_owned())
+    }
+}
+
+/// `--classes`: classes of LAS points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Classes {
+    listed: Vec<u8>,
+    /// Whether all others are wanted.
+    is_except: bool,
+}
+
+impl Classes {
+    /// Whether points of a class are wanted.
+    pub fn has(&self, class: f32) -> bool {
+        self.listed.iter().any(|&listed| f32::from(listed) == class) != self.is_except
+    }
+}
+
+/// `--classes`.
+pub fn classes(text: &str) -> Result<Classes, String> {
+    let (is_except, list) = text.strip_prefix('!').map_or((false, text), |list| (true, list));
+    let listed: Option<Vec<u8>> = list.split(',').map(|class| class.trim().parse().ok()).collect();
+    let listed =
+        listed.ok_or("expected numbers from 0 to 255 between commas, ! before them for all others")?;
+    Ok(Classes { listed, is_except })
+}
+
+/// `--color`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ColorChoice {
+    /// The cloud's colours.
+    Rgb,
+    /// The coordinate along the up axis.
+    Height,
+    /// The direction of the surface.
+    Normal,
+    /// The class of LAS points.
+    Class,
+    /// A scalar field, by its name: the intensity among them.
+    Field(String),
+}
+
+/// `--color`.
+pub fn color(text: &str) -> Result<ColorChoice, String> {
+    Ok(match text {
+        "" => return Err("expected rgb, intensity, height, normal, class, or the name of a field".to_owned()),
+        "rgb" => ColorChoice::Rgb,
+        "height" => ColorChoice::Height,
+        "normal" => ColorChoice::Normal,
+        "class" => ColorChoice::Class,
+        field => ColorChoice::Field(field.to_owned()),
+    })
+}
+
+/// `--color-range`: two finite numbers, the first one less.
+pub fn color_range(text: &str) -> Result<[f64; 2], String> {
+    let ends = split(text, ':').filter(|ends: &[f64; 2]| ends.iter().all(|end| end.is_finite()));
+    ends.filter(|[low, high]| low < high)
+        .ok_or_else(|| "expected LO:HI, finite numbers with LO < HI".to_owned())
+}
+
 /// `--focus`: a depth greater than 0, or `inf`.
 pub fn focus(text: &str) -> Result<f64, String> {
     number(text, "a number greater than 0, or inf", |value| value > 0.0)

@@ -35,6 +35,18 @@ pub struct Cloud {
     /// Whether these are trained Gaussian splats, to be blended one by one ([`splat_abuffer::Resolve::Over`]) and not
     /// joined into surfaces. The renderer does as its options say; this is for whoever chooses them.
     pub trained: bool,
+    /// What else was measured at each splat. The renderer passes over it, whatever it is: it can be made into
+    /// colours.
+    pub fields: Vec<Field>,
+}
+
+/// A scalar field: one number a splat.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Field {
+    /// Its name in the file: "intensity", "classification".
+    pub name: String,
+    /// A value for each splat, in the units of the file; may be anything.
+    pub values: Vec<f32>,
 }
 
 /// The extent of each splat.
@@ -176,7 +188,8 @@ impl Cloud {
             ("areas", self.areas.as_ref().map(Vec::len)),
             ("texture coordinates", self.texture_coordinates.as_ref().map(Vec::len)),
         ];
-        for (what, length) in lengths {
+        let fields = self.fields.iter().map(|field| ("field", Some(field.values.len())));
+        for (what, length) in lengths.into_iter().chain(fields) {
             if let Some(found) = length.filter(|&found| found != expected) {
                 return Err(Error::Length { what, found, expected });
             }
@@ -215,6 +228,11 @@ impl Cloud {
             _ if self.areas.as_ref().is_some_and(|areas| areas[index] <= 0.0) => Some(Defect::NoArea),
             _ => None,
         }
+    }
+
+    /// The scalar field of that name, in any case; the first if there are several.
+    pub fn field(&self, name: &str) -> Option<&Field> {
+        self.fields.iter().find(|field| field.name.eq_ignore_ascii_case(name))
     }
 
     /// Least and greatest world position of the finite points, or `None` if there is none.
@@ -292,6 +310,19 @@ mod tests {
         assert_eq!(
             cloud.check_lengths().unwrap_err().to_string(),
             "cloud: texture coordinates has 0 entries for 1 positions"
+        );
+    }
+
+    #[test]
+    fn fields_must_be_as_long_as_the_cloud_and_are_no_defect() {
+        let mut cloud = textured(TextureCoordinates::default());
+        cloud.fields = vec![Field { name: "Intensity".to_owned(), values: vec![f32::NAN] }];
+        assert!(cloud.check_lengths().is_ok() && cloud.defect(0).is_none());
+        assert!(cloud.field("intensity").is_some() && cloud.field("time").is_none());
+        cloud.fields[0].values.clear();
+        assert_eq!(
+            cloud.check_lengths().unwrap_err().to_string(),
+            "cloud: field has 0 entries for 1 positions"
         );
     }
 }

@@ -25,7 +25,7 @@ pub mod srgb;
 pub mod texture;
 
 pub use camera::{Camera, Distortion, Lens, Projection};
-pub use cloud::{Cloud, Defect, Shapes, TextureCoordinates};
+pub use cloud::{Cloud, Defect, Field, Shapes, TextureCoordinates};
 pub use error::Error;
 pub use film::{AovSelection, Film, PixelRect};
 pub use harmonics::SphericalHarmonics;

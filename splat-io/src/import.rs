@@ -81,6 +81,8 @@ pub enum Usage {
     Harmonic,
     /// A bound, between which packed numbers lie.
     Bounds,
+    /// A scalar field of the cloud.
+    Field,
     /// A list of the vertices of a face.
     Face,
     /// Nothing, for this reason.
@@ -102,6 +104,7 @@ impl fmt::Display for Usage {
             Self::Rotation => write!(f, "rotation"),
             Self::Harmonic => write!(f, "color, by direction"),
             Self::Bounds => write!(f, "bounds of packed numbers"),
+            Self::Field => write!(f, "scalar field"),
             Self::Face => write!(f, "the corners of faces"),
             Self::Unused(reason) => write!(f, "not used ({reason})"),
         }

@@ -19,8 +19,8 @@
 //! Integer colors are sRGB: `uchar` and `ushort` over their type's range, `char` as if it were `uchar`, other
 //! types as 8-bit levels, clamped to 0 to 255.
 //!
-//! Everything else (`confidence`, `quality`, `intensity`, faces) is reported as not used. ([`crate::read_ply_mesh`]
-//! reads the faces, too.) Two comments that [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a
+//! Other numbers (`confidence`, `quality`, `intensity`) become scalar fields of the cloud, the first 32 of them. All else
+//! (lists, faces) is reported as not used. ([`crate::read_ply_mesh`] reads the faces, too.) Two comments that [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a
 //! file are oriented unless it says 0) and `comment splat origin X Y Z` (the cloud's origin, used if it keeps
 //! every position exactly).
 //!
@@ -29,28 +29,24 @@
 
 mod ascii;
 mod binary;
-mod columns;
 mod compressed;
 mod faces;
 mod gaussians;
 mod header;
-mod roles;
 mod rows;
-mod scalar;
 #[cfg(test)]
-mod tests;
-mod tone;
+pub(crate) mod tests;
 mod trained;
-mod writer;
+pub(crate) mod writer;
 
 pub use writer::{PlyEncoding, write_ply};
 
 use crate::mesh::MeshImport;
 use crate::source::Source;
+use crate::table::{Columns, Element, Outcome};
 use crate::{ElementReport, Error, Import, ImportReport, PropertyReport, Usage};
-use columns::{Columns, Outcome};
 use faces::Faces;
-use header::{Element, Format, Header};
+use header::{Format, Header};
 use rows::{Table, Tables};
 use std::fs::File;
 use std::io::Read;
@@ -98,7 +94,7 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
     let points = tables.points;
     let (sha256, bytes) = source.finish()?;
 
-    let Outcome { cloud, usages, mut assumptions, color_assumptions } = tables.columns.finish(&header);
+    let Outcome { cloud, usages, mut assumptions, color_assumptions } = tables.columns.finish(header.hints());
     assumptions.extend(color_assumptions);
     for (index, other) in header.elements.iter().enumerate().filter(|(_, other)| other.count > 0) {
         if index != points {
@@ -154,7 +150,7 @@ pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<M
     let (sha256, bytes) = source.finish()?;
 
     let points = tables.points;
-    let Outcome { cloud, usages, color_assumptions, .. } = tables.columns.finish(&header);
+    let Outcome { cloud, usages, color_assumptions, .. } = tables.columns.finish(header.hints());
     let Some((faces_index, faces)) = tables.faces else {
         return Err(Faces::missing(path));
     };

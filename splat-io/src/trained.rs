@@ -7,7 +7,7 @@
 //! | `.spz`, version 2 to 4 | [`read_spz`] | degree 0 to 3, 8 bits, -1 to 1 |
 //! | `.splat` | [`read_splat`], [`write_splat`] | none |
 //!
-//! [`read_trained`] tells the latter two by their content and name. In PLY files, by property:
+//! [`crate::read_cloud`] tells which it is. In PLY files, by property:
 //!
 //! | property | meaning |
 //! |---|---|
@@ -24,38 +24,10 @@
 
 mod gaussians;
 mod splat_file;
-mod spz;
+pub(crate) mod spz;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use gaussians::{Gaussian, Gaussians, sigmoid};
 pub use splat_file::{read_splat, read_splat_from, write_splat};
 pub use spz::{read_spz, read_spz_from};
-
-use crate::ply::open;
-use crate::{Error, Import};
-use std::io::Read;
-use std::path::Path;
-
-/// Reads trained splats from an `.spz` file, known by its first bytes, or a `.splat` file, known by its name; `None` for
-/// any other file, PLY among them.
-///
-/// # Errors
-/// [`Error::Unsupported`] for `.ksplat`; what [`read_spz`] and [`read_splat`] say.
-pub fn read_trained(path: &Path) -> Result<Option<Import>, Error> {
-    let (mut file, _) = open(path)?;
-    let mut start = Vec::new();
-    file.by_ref().take(4).read_to_end(&mut start).map_err(Error::io(path, "read"))?;
-    let has_extension = |name: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(name));
-    if start.starts_with(b"ply") {
-        return Ok(None);
-    }
-    if start.starts_with(&spz::GZIP) || start == spz::MAGIC || has_extension("spz") {
-        return read_spz(path).map(Some);
-    }
-    if has_extension("ksplat") {
-        let expected = "trained splats as .ply, .spz or .splat (convert it, for example with SuperSplat)";
-        return Err(Error::unsupported(path, "the format .ksplat", expected));
-    }
-    if has_extension("splat") { read_splat(path).map(Some) } else { Ok(None) }
-}

@@ -4,7 +4,7 @@ use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{
-    Camera, Cloud, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes, SphericalHarmonics,
+    Camera, Cloud, Field, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes, SphericalHarmonics,
 };
 
 use crate::random::Random;
@@ -77,6 +77,11 @@ pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
         texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
         oriented: cloud.oriented,
         trained: cloud.trained,
+        fields: cloud
+            .fields
+            .iter()
+            .map(|field| Field { name: field.name.clone(), values: pick(&field.values, order) })
+            .collect(),
     }
 }
 

@@ -60,8 +60,8 @@ fn cloud(number: impl Strategy<Value = f32> + Clone + 'static) -> impl Strategy<
             colors,
             opacities,
             areas,
-            texture_coordinates: None,
             oriented,
+            ..Cloud::default()
         })
 }
 

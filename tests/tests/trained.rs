@@ -173,8 +173,7 @@ fn strays_do_not_make_a_scene_small() {
 
 fn real_cloud(name: &str) -> Option<Cloud> {
     let path = Path::new(&std::env::var_os("SPLAT_TEST_DATA")?).join("splats").join(name);
-    let import = splat_io::read_trained(&path).unwrap();
-    Some(import.unwrap_or_else(|| splat_io::read_ply(&path).unwrap()).cloud)
+    Some(splat_io::read_cloud(&path, &splat_io::CloudOptions::default()).unwrap().cloud)
 }
 
 /// The picture of Playbot, 160 x 120.

@@ -1,10 +1,11 @@
 //! What is said of a cloud.
 
-use crate::{describe, inputs};
+use crate::describe;
+use crate::values::Columns;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
-use splat_core::{Cloud, Shapes, SphericalHarmonics};
-use splat_io::{Import, ImportReport, Usage};
+use splat_core::{Cloud, Field, Shapes, SphericalHarmonics};
+use splat_io::{CloudOptions, Import, ImportReport, Usage, decimals, read_cloud};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,16 @@ pub struct Summary {
     areas: bool,
     texture_coordinates: bool,
     sizes: Sizes,
+    fields: Vec<FieldSummary>,
     assumptions: Vec<String>,
+}
+
+/// What is said of a scalar field.
+#[derive(Debug, Serialize)]
+struct FieldSummary {
+    name: String,
+    /// Least, mean and greatest of the finite values.
+    range: Option<[f64; 3]>,
 }
 
 /// One table of the file.
@@ -85,8 +95,9 @@ impl Summary {
     ///
     /// # Errors
     /// What the reader says.
-    pub fn read(path: &Path) -> Result<Self, splat_io::Error> {
-        let Import { cloud, report } = inputs::read_cloud(path)?;
+    pub fn read(path: &Path, columns: Option<&Columns>) -> Result<Self, splat_io::Error> {
+        let options = CloudOptions { columns: columns.map(|columns| columns.0.clone()) };
+        let Import { cloud, report } = read_cloud(path, &options)?;
         Ok(Self::new(cloud, report))
     }
 
@@ -116,7 +127,7 @@ impl Summary {
             elements: elements.collect(),
             points: cloud.len(),
             finite: cloud.positions.iter().filter(|position| position.is_finite()).count(),
-            bounds: cloud.bounds().map(|(low, high)| [low.to_array(), high.to_array()]),
+            bounds: bounds(&cloud),
             diagonal: cloud.diagonal(),
             origin: cloud.origin.to_array(),
             normals: (!cloud.normals.is_empty()).then(|| normals(&cloud)),
@@ -127,10 +138,27 @@ impl Summary {
             areas: cloud.areas.is_some(),
             texture_coordinates: cloud.texture_coordinates.is_some(),
             sizes: sizes(&cloud),
+            fields: cloud.fields.iter().map(FieldSummary::new).collect(),
             dropped: dropped(&mut cloud),
             assumptions,
         }
     }
+}
+
+impl FieldSummary {
+    fn new(field: &Field) -> Self {
+        let finite: Vec<f64> =
+            field.values.iter().filter(|value| value.is_finite()).map(|&value| f64::from(value)).collect();
+        Self { name: field.name.clone(), range: spread(&finite) }
+    }
+}
+
+/// Least and greatest corner, with the decimals that the coordinates have.
+fn bounds(cloud: &Cloud) -> Option<[[f64; 3]; 2]> {
+    let (low, high) = cloud.bounds()?;
+    let power = decimals(cloud).map(|decimals| 10_f64.powi(decimals));
+    let rounded = |coordinate: f64| power.map_or(coordinate, |power| (coordinate * power).round() / power);
+    Some([low, high].map(|corner| corner.to_array().map(rounded)))
 }
 
 fn normals(cloud: &Cloud) -> Normals {
@@ -152,10 +180,14 @@ fn sizes(cloud: &Cloud) -> Sizes {
         }
     };
     let known: Vec<f64> = sizes.into_iter().filter(|&size| size.is_finite() && size > 0.0).collect();
-    let [low, high] = [f64::min, f64::max].map(|pick| known.iter().copied().reduce(pick));
-    let mean = known.iter().sum::<f64>() / known.len() as f64;
-    let range = low.zip(high).map(|(low, high)| [low, mean, high]);
-    Sizes { shape, known: known.len(), unknown: describe::unknown_sizes(cloud), range }
+    Sizes { shape, known: known.len(), unknown: describe::unknown_sizes(cloud), range: spread(&known) }
+}
+
+/// Least, mean and greatest of numbers.
+fn spread(values: &[f64]) -> Option<[f64; 3]> {
+    let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().reduce(pick));
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    low.zip(high).map(|(low, high)| [low, mean, high])
 }
 
 /// Least and greatest of the finite values.
@@ -228,6 +260,12 @@ impl fmt::Display for Summary {
         if let Some([low, mean, high]) = range {
             writeln!(f, "  sigma      {low} to {high}, mean {mean}")?;
         }
+        for FieldSummary { name, range } in &self.fields {
+            match range {
+                Some([low, mean, high]) => writeln!(f, "field        {name}: {low} to {high}, mean {mean}")?,
+                None => writeln!(f, "field        {name}: no finite value")?,
+            }
+        }
         writeln!(f, "assumptions")?;
         for assumption in &self.assumptions {
             writeln!(f, "  - {assumption}")?;
@@ -268,12 +306,14 @@ mod tests {
         cloud.normals = vec![Vec3::X, Vec3::Y, Vec3::ZERO, Vec3::NAN];
         cloud.shapes = Shapes::Discs(vec![1.0, 3.0, 0.0, -1.0]);
         cloud.opacities = Some(vec![0.25, 1.0, 0.5, 0.5]);
+        cloud.fields = vec![Field { name: "time".to_owned(), values: vec![1.0, f32::NAN, 2.0, 6.0] }];
         let summary = summary(cloud);
         let normals = summary.normals.as_ref().unwrap();
         assert_eq!((normals.unit, normals.zero, normals.not_finite), (2, 1, 1));
         assert_eq!(summary.sizes.range, Some([1.0, 2.0, 3.0]));
         assert_eq!((summary.sizes.known, summary.sizes.unknown), (2, 1));
         assert_eq!(summary.opacities, Some([0.25, 1.0]));
+        assert!(summary.to_string().contains("field        time: 1 to 6, mean 3\n"));
         assert_eq!(summary.dropped, [("not_finite", 1), ("zero_normal", 1)].into());
     }
 

@@ -1,11 +1,11 @@
 //! Tables as text: a row a line, numbers between blanks.
 
 use super::faces::{Faces, List};
-use super::header::{Element, Header, Kind};
+use super::header::Header;
 use super::rows::{Rows, Table, Tables};
-use super::scalar::Scalar;
 use crate::error::quoted;
 use crate::source::Source;
+use crate::table::{Element, Kind, Scalar};
 use crate::{Error, Place};
 use std::io::Read;
 

@@ -1,10 +1,10 @@
 //! Tables in binary, either endian.
 
 use super::faces::{Faces, List};
-use super::header::{Element, Header, Kind};
+use super::header::Header;
 use super::rows::{Rows, Table, Tables};
-use super::scalar::Scalar;
 use crate::source::Source;
+use crate::table::{Element, Kind, Scalar};
 use crate::{Error, Place};
 use std::io::Read;
 

@@ -11,8 +11,9 @@
 //! The first is in the most significant bits. A further coefficient b is 8 (b + 1/2)/256 - 4; 0 and 255 are -4 and 4.
 
 use super::gaussians::{Rest, missing, position, too_many};
-use super::header::{Element, Header};
+use super::header::Header;
 use super::rows::{Rows, Table, Tables};
+use crate::table::Element;
 use crate::trained::{Gaussian, Gaussians};
 use crate::{Error, Place, Usage};
 use glam::{DVec3, Vec3};

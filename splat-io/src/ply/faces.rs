@@ -1,7 +1,8 @@
 //! The table of faces of a PLY file.
 
-use super::header::{Element, Header, Kind};
+use super::header::Header;
 use crate::mesh::{Mesh, NO_INDEX, fan};
+use crate::table::{Element, Kind};
 use crate::{Error, Place, Usage};
 use glam::DVec2;
 use splat_core::Cloud;

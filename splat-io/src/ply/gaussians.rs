@@ -1,7 +1,7 @@
 //! Trained Gaussian splats in PLY files: 3DGS (Kerbl et al. 2023) and 2DGS (Huang et al. 2024).
 
-use super::header::{Element, Kind};
 use super::rows::Rows;
+use crate::table::{Element, Kind};
 use crate::trained::{Gaussian, Gaussians, sigmoid};
 use crate::{Error, Place, Usage};
 use glam::{DVec3, Vec3};

@@ -2,9 +2,9 @@
 
 mod reader;
 
-use super::scalar::Scalar;
 use crate::error::quoted;
 use crate::source::Source;
+use crate::table::{Element, Hints};
 use crate::{Error, Place};
 use glam::DVec3;
 use std::io::Read;
@@ -42,61 +42,12 @@ pub(super) struct Header {
     pub origin: Option<DVec3>,
 }
 
-/// A table.
-#[derive(Debug)]
-pub(super) struct Element {
-    pub name: String,
-    /// Number of rows that the header claims.
-    pub count: u64,
-    /// The line that claims it.
-    pub line: u64,
-    pub properties: Vec<Property>,
-}
-
-/// A column.
-#[derive(Debug)]
-pub(super) struct Property {
-    pub name: String,
-    pub kind: Kind,
-}
-
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Scalar(Scalar),
-    List { count: Scalar, item: Scalar },
-}
-
-impl Kind {
-    /// The type as the header writes it.
-    pub fn describe(self) -> String {
-        match self {
-            Self::Scalar(kind) => kind.names()[0].to_owned(),
-            Self::List { count, item } => format!("list {} {}", count.names()[0], item.names()[0]),
-        }
-    }
-
-    /// Size of the smallest value in a binary file, in bytes: a list may be empty.
-    fn least_bytes(self) -> usize {
-        match self {
-            Self::Scalar(kind) | Self::List { count: kind, .. } => kind.bytes(),
-        }
-    }
-}
-
-impl Element {
-    /// Size of the smallest row in a binary file, in bytes.
-    pub fn least_bytes(&self) -> usize {
-        self.properties.iter().map(|property| property.kind.least_bytes()).sum()
-    }
-
-    /// Whether every row of a binary file has the same size.
-    pub fn is_fixed(&self) -> bool {
-        self.properties.iter().all(|property| matches!(property.kind, Kind::Scalar(_)))
-    }
-}
-
 impl Header {
+    /// What the comments say of the points.
+    pub fn hints(&self) -> Hints {
+        Hints { oriented: self.oriented, origin: self.origin }
+    }
+
     /// Index of the table of points: `vertex`, else `point`.
     pub fn points(&self, path: &Path) -> Result<usize, Error> {
         let position = |name| self.elements.iter().position(|e| e.name.eq_ignore_ascii_case(name));

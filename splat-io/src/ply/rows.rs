@@ -1,6 +1,7 @@
 //! Tables of which rows are wanted, and who takes them.
 
 use super::faces::Faces;
+use crate::table::{Columns, SLOTS};
 
 /// Takes the rows of a table.
 pub(super) trait Rows {
@@ -15,6 +16,24 @@ pub(super) trait Rows {
 
     /// Takes a row.
     fn push(&mut self, row: &[f64]);
+}
+
+impl Rows for Columns {
+    fn slots(&self) -> &[Option<usize>] {
+        &self.roles.slots
+    }
+
+    fn width(&self) -> usize {
+        SLOTS
+    }
+
+    fn count(&self) -> usize {
+        Self::count(self)
+    }
+
+    fn push(&mut self, row: &[f64]) {
+        Self::push(self, row);
+    }
 }
 
 /// What becomes of a table.

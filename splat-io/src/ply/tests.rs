@@ -7,12 +7,12 @@ mod meaning;
 mod roundtrip;
 mod trained;
 
-use super::scalar::Scalar;
 use super::*;
+use crate::table::Scalar;
 use splat_core::Cloud;
 
 /// The bytes of a number in a binary file.
-pub(super) fn encode(kind: Scalar, value: f64, big: bool) -> Vec<u8> {
+pub(crate) fn encode(kind: Scalar, value: f64, big: bool) -> Vec<u8> {
     let mut bytes = match kind {
         Scalar::I8 => (value as i8).to_be_bytes().to_vec(),
         Scalar::U8 => (value as u8).to_be_bytes().to_vec(),

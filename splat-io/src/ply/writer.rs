@@ -21,7 +21,7 @@ pub enum PlyEncoding {
 ///
 /// Positions are `double` if the cloud has an origin other than zero, else `float`; all else is `float`: `nx
 /// ny nz`, `radius` (sigma) or `tu_x .. tv_z`, `red green blue` (linear), `opacity`, `area`, `s t ds_du dt_du ds_dv
-/// dt_dv`.
+/// dt_dv`, and the scalar fields under their names (blanks in them become `_`).
 /// [`crate::read_ply`] gives the same cloud, bit for bit, provided that normals are unit vectors, that
 /// opacities lie in [0, 1], and that origin + offset keeps the offsets' bits (as it does in every cloud that
 /// was made from `f64` positions).
@@ -76,6 +76,9 @@ fn write_header(out: &mut impl Write, cloud: &Cloud, encoding: PlyEncoding) -> i
     if cloud.texture_coordinates.is_some() {
         properties(out, "float", &["s", "t", "ds_du", "dt_du", "ds_dv", "dt_dv"])?;
     }
+    for field in &cloud.fields {
+        properties(out, "float", &[&one_word(&field.name)])?;
+    }
     writeln!(out, "end_header")
 }
 
@@ -104,9 +107,15 @@ fn write_rows(out: &mut impl Rows, cloud: &Cloud) -> io::Result<()> {
         if let Some(coordinates) = &cloud.texture_coordinates {
             out.floats(&coordinates[index].to_array())?;
         }
+        cloud.fields.iter().try_for_each(|field| out.floats(&[field.values[index]]))?;
         out.end()?;
     }
     Ok(())
+}
+
+/// A name without blanks.
+pub(crate) fn one_word(name: &str) -> String {
+    name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect()
 }
 
 /// What rows are written to.
@@ -162,7 +171,7 @@ impl<W: Write> Rows for TextRows<'_, W> {
 
 /// The shortest text that reads back as the same number: plain at everyday magnitudes, otherwise with an
 /// exponent.
-struct Shortest<T>(T);
+pub(crate) struct Shortest<T>(pub T);
 
 impl<T: Display + fmt::LowerExp + Copy + Into<f64>> Display for Shortest<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

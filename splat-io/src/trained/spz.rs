@@ -32,10 +32,10 @@ use std::io::Read;
 use std::path::Path;
 
 /// The first bytes of a gzip file.
-pub(super) const GZIP: [u8; 2] = [0x1f, 0x8b];
+pub(crate) const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// The first bytes of the header.
-pub(super) const MAGIC: &[u8] = b"NGSP";
+pub(crate) const MAGIC: &[u8] = b"NGSP";
 
 /// How many times as large as its file the data may be: the most that gzip can do. Claims beyond that are refused.
 const MOST_RATIO: u64 = 1032;

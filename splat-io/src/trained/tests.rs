@@ -2,7 +2,7 @@
 //! has them.
 
 use super::*;
-use crate::read_ply;
+use crate::{CloudOptions, Error, Import, read_cloud};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use glam::{DVec3, Vec3};
@@ -10,10 +10,15 @@ use proptest::prelude::*;
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use splat_core::{Cloud, Shapes, SphericalHarmonics, srgb};
 use std::io::Write;
+use std::path::Path;
 use std::path::PathBuf;
 
 fn spz(bytes: &[u8]) -> Result<Import, Error> {
     read_spz_from(bytes, bytes.len() as u64, Path::new("x.spz"))
+}
+
+fn read_any(path: &Path) -> Result<Import, Error> {
+    read_cloud(path, &CloudOptions::default())
 }
 
 fn splat(bytes: &[u8]) -> Result<Import, Error> {
@@ -186,7 +191,7 @@ fn what_is_written_is_read() {
     cloud.colors = Some([0.0, 0.5, 2.0].map(Vec3::splat).to_vec());
     cloud.opacities = Some(vec![0.25, 0.5, 1.0]);
     assert_eq!(write_splat(&path, &cloud).unwrap(), 1);
-    let back = read_trained(&path).unwrap().unwrap().cloud;
+    let back = read_any(&path).unwrap().cloud;
     assert_eq!(back.len(), 2);
     for (index, old) in [(0, 0), (1, 2)] {
         assert_eq!(back.world_position(index), cloud.world_position(old));
@@ -203,7 +208,7 @@ fn what_is_written_is_read() {
 
     // What comes from such a file survives another round, to the byte's step.
     assert_eq!(write_splat(&path, &back).unwrap(), 0);
-    let again = read_trained(&path).unwrap().unwrap().cloud;
+    let again = read_any(&path).unwrap().cloud;
     assert_eq!((again.positions, again.opacities), (back.positions, back.opacities));
     for (new, old) in again.colors.unwrap().into_iter().zip(back.colors.unwrap()) {
         assert!(new.abs_diff_eq(old, 1e-6));
@@ -213,7 +218,7 @@ fn what_is_written_is_read() {
     discs.normals = vec![Vec3::new(0.6, 0.0, 0.8)];
     discs.shapes = Shapes::Discs(vec![0.5]);
     assert_eq!(write_splat(&path, &discs).unwrap(), 0);
-    let back = read_trained(&path).unwrap().unwrap().cloud;
+    let back = read_any(&path).unwrap().cloud;
     assert!(back.normals[0].abs().abs_diff_eq(discs.normals[0], 0.02), "{}", back.normals[0]);
     let [t1, t2] = axes(&back)[0];
     assert!((t1.length() - 0.5).abs() < 1e-6 && (t2.length() - 0.5).abs() < 1e-6);
@@ -267,8 +272,7 @@ fn real_file(name: &str) -> Option<PathBuf> {
 
 fn real_cloud(name: &str) -> Option<Cloud> {
     let path = real_file(name)?;
-    let import = read_trained(&path).unwrap();
-    Some(import.unwrap_or_else(|| read_ply(&path).unwrap()).cloud)
+    Some(read_any(&path).unwrap().cloud)
 }
 
 /// Name, splats, degree, least and greatest coordinates, trained opacities.
@@ -332,7 +336,7 @@ fn minimal_files_by_hand() {
         }
         assert!(cloud.opacities.unwrap().iter().all(|opacity| (opacity - 230.0 / 255.0).abs() < 1e-6));
     }
-    let ksplat = read_trained(&real_file("minimal.ksplat").unwrap()).unwrap_err();
+    let ksplat = read_any(&real_file("minimal.ksplat").unwrap()).unwrap_err();
     assert!(
         matches!(ksplat, Error::Unsupported { .. }) && ksplat.to_string().contains(".ksplat"),
         "{ksplat}"

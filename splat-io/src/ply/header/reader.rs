@@ -1,9 +1,9 @@
 //! From the first bytes of a file to its header.
 
-use super::{Element, Format, Header, Kind, Property};
+use super::{Format, Header};
 use crate::error::quoted;
-use crate::ply::scalar::Scalar;
 use crate::source::Source;
+use crate::table::{Element, Kind, Property, Scalar};
 use crate::{Error, Place};
 use glam::DVec3;
 use std::collections::HashSet;

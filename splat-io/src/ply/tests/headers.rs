@@ -64,7 +64,7 @@ fn lists_and_unknown_properties_are_skipped_anywhere() {
         assert_eq!(import.report.elements[1].properties[0].kind, "list ushort double");
         assert_eq!(import.report.elements[1].properties[0].usage, Usage::Unused("a list"));
         assert_eq!(import.report.elements[1].properties[3].usage, Usage::Position);
-        assert_eq!(import.report.elements[1].properties[4].usage, Usage::Unused("unknown"));
+        assert_eq!(import.report.elements[1].properties[4].usage, Usage::Field);
     }
 }
 

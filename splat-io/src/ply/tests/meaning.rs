@@ -106,7 +106,8 @@ fn sizes_have_many_names() {
     for import in one(&[("float psz", 0.5), ("double radius", 0.25), ("float confidence", 1.0)]) {
         assert_eq!(import.cloud.shapes, Shapes::Discs(vec![0.25]));
         assert_eq!(usage(&import, "psz"), Usage::Unused("another property of this meaning comes first"));
-        assert!(matches!(usage(&import, "confidence"), Usage::Unused(_)));
+        assert_eq!(usage(&import, "confidence"), Usage::Field);
+        assert_eq!(import.cloud.field("confidence").unwrap().values, [1.0]);
     }
     for import in one(&[]) {
         assert_eq!(import.cloud.shapes, Shapes::Discs(vec![0.0]));
@@ -240,10 +241,7 @@ fn the_report_tells_all() {
         report.assumptions.contains(&"element face (2 rows) is ignored: only points are drawn".to_owned())
     );
     assert_eq!(report.elements[0].properties[3].kind, "uchar");
-    assert_eq!(
-        report.elements[0].properties[3].usage.to_string(),
-        "not used (a measurement, not part of the picture)"
-    );
+    assert_eq!(report.elements[0].properties[3].usage.to_string(), "scalar field");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use glam::{DVec3, Vec2, Vec3};
 use proptest::prelude::*;
-use splat_core::{Shapes, TextureCoordinates};
+use splat_core::{Field, Shapes, TextureCoordinates};
 
 /// Everything in a cloud, as bits.
 fn bits(cloud: &Cloud) -> (Vec<u64>, Vec<Option<Vec<u32>>>, bool) {
@@ -13,7 +13,7 @@ fn bits(cloud: &Cloud) -> (Vec<u64>, Vec<Option<Vec<u32>>>, bool) {
         Shapes::Discs(sizes) => scalars(sizes),
         Shapes::Ellipses(axes) => vectors(axes.as_flattened()),
     };
-    let columns = vec![
+    let mut columns = vec![
         Some(vectors(&cloud.positions)),
         Some(vectors(&cloud.normals)),
         Some(shapes),
@@ -25,6 +25,7 @@ fn bits(cloud: &Cloud) -> (Vec<u64>, Vec<Option<Vec<u32>>>, bool) {
             .as_ref()
             .map(|all| scalars(&all.iter().flat_map(|c| c.to_array()).collect())),
     ];
+    columns.extend(cloud.fields.iter().map(|field| Some(scalars(&field.values))));
     (cloud.origin.to_array().map(f64::to_bits).to_vec(), columns, cloud.oriented)
 }
 
@@ -86,8 +87,18 @@ prop_compose! {
             per_v: pair(v, 4),
         };
         cloud.texture_coordinates = has[5].then(|| rows.iter().map(|row| coordinates(&row.6)).collect());
+        cloud.fields = fields_of(&rows.iter().map(|row| row.2).collect::<Vec<_>>(), oriented);
         cloud
     }
+}
+
+/// Two scalar fields, if they are wanted.
+fn fields_of(rows: &[[f32; 6]], wanted: bool) -> Vec<Field> {
+    let field = |name: &str, column: usize| Field {
+        name: name.to_owned(),
+        values: rows.iter().map(|row| row[column]).collect(),
+    };
+    if wanted { vec![field("intensity", 4), field("return_number", 5)] } else { Vec::new() }
 }
 
 proptest! {

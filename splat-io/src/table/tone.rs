@@ -5,7 +5,7 @@ use crate::srgb;
 
 /// How a color channel's numbers become linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tone {
+pub(crate) enum Tone {
     /// They are.
     Linear,
     /// 8-bit sRGB; from other integers clamped to 0 to 255.

@@ -1,20 +1,19 @@
 //! From the rows of a table of points to a cloud.
 
-use super::header::{Element, Header};
+use super::Element;
 use super::roles::{
-    AREA, COLOR, NORMAL, OPACITY, POSITION, Roles, SIZE, SLOTS, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
+    AREA, COLOR, FIELDS, NORMAL, OPACITY, POSITION, Roles, SIZE, TANGENTS, TEXTURE, TEXTURE_DERIVATIVES,
 };
-use super::rows::Rows;
 use super::scalar::Scalar;
 use super::tone::Tone;
 use crate::{Error, Usage};
 use glam::{DVec3, Vec2, Vec3};
-use splat_core::{Cloud, Shapes, TextureCoordinates};
+use splat_core::{Cloud, Field, Shapes, TextureCoordinates};
 use std::collections::TryReserveError;
 use std::path::Path;
 
 /// A cloud half read, and how its columns are filled.
-pub(super) struct Columns {
+pub(crate) struct Columns {
     pub roles: Roles,
     /// Number of rows to come.
     count: usize,
@@ -30,10 +29,20 @@ pub(super) struct Columns {
     areas: Option<Vec<f32>>,
     tangents: Option<Vec<[Vec3; 2]>>,
     texture_coordinates: Option<Vec<TextureCoordinates>>,
+    fields: Vec<Field>,
+}
+
+/// What a file says of its points as a whole.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Hints {
+    /// Whether the normals are oriented.
+    pub oriented: Option<bool>,
+    /// The cloud's origin; finite.
+    pub origin: Option<DVec3>,
 }
 
 /// What became of the columns.
-pub(super) struct Outcome {
+pub(crate) struct Outcome {
     pub cloud: Cloud,
     /// Per property of the element.
     pub usages: Vec<Usage>,
@@ -71,10 +80,16 @@ impl Columns {
             areas: kinds[AREA].map(|_| Vec::new()),
             tangents: kinds[TANGENTS.start].map(|_| Vec::new()),
             texture_coordinates: kinds[TEXTURE.start].map(|_| Vec::new()),
+            fields: roles
+                .field_names
+                .iter()
+                .map(|name| Field { name: name.clone(), values: Vec::new() })
+                .collect(),
             roles,
         }
     }
 
+    /// Makes room for rows.
     fn reserve(&mut self, count: u64) -> Result<(), TryReserveError> {
         fn room<T>(column: &mut Option<Vec<T>>, count: usize) -> Result<(), TryReserveError> {
             column.as_mut().map_or(Ok(()), |column| column.try_reserve_exact(count))
@@ -87,22 +102,66 @@ impl Columns {
         room(&mut self.sizes, self.count)?;
         room(&mut self.areas, self.count)?;
         room(&mut self.tangents, self.count)?;
-        room(&mut self.texture_coordinates, self.count)
+        room(&mut self.texture_coordinates, self.count)?;
+        self.fields.iter_mut().try_for_each(|field| field.values.try_reserve_exact(self.count))
+    }
+
+    /// Number of rows that were claimed.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Adds a row: a value for each slot.
+    #[inline]
+    pub fn push(&mut self, row: &[f64]) {
+        let triple = |slot: usize| DVec3::new(row[slot], row[slot + 1], row[slot + 2]);
+        self.positions.push(triple(POSITION.start));
+        if let Some(normals) = &mut self.normals {
+            normals.push(unit(triple(NORMAL.start)));
+        }
+        if let Some(colors) = &mut self.colors {
+            let channel = |channel: usize| self.tones[channel].linear(row[COLOR.start + channel]);
+            let color = Vec3::new(channel(0), channel(1), channel(2));
+            self.greatest_color = self.greatest_color.max(color.max_element());
+            colors.push(color);
+        }
+        if let Some(opacities) = &mut self.opacities {
+            let mut opacity = row[OPACITY] * self.opacity_scale;
+            if opacity.is_finite() && !(0.0..=1.0).contains(&opacity) {
+                opacity = opacity.clamp(0.0, 1.0);
+                self.clamped_opacities += 1;
+            }
+            opacities.push(opacity as f32);
+        }
+        if let Some(sizes) = &mut self.sizes {
+            sizes.push(row[SIZE] as f32);
+        }
+        if let Some(areas) = &mut self.areas {
+            areas.push(row[AREA] as f32);
+        }
+        if let Some(tangents) = &mut self.tangents {
+            let [u, v] = [TANGENTS.start, TANGENTS.start + 3].map(triple);
+            tangents.push([u.as_vec3(), v.as_vec3()]);
+        }
+        if let Some(coordinates) = &mut self.texture_coordinates {
+            let pair = |slot: usize| Vec2::new(row[slot] as f32, row[slot + 1] as f32);
+            let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
+            coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
+        }
+        for (field, value) in self.fields.iter_mut().zip(&row[FIELDS..]) {
+            field.values.push(*value as f32);
+        }
     }
 
     /// Makes the cloud and says what was assumed.
-    pub fn finish(mut self, header: &Header) -> Outcome {
+    pub fn finish(mut self, hints: Hints) -> Outcome {
         let mut assumptions = Vec::new();
         self.drop_zero_normals(&mut assumptions);
-        let mut cloud = located(&self.positions, header.origin);
+        let mut cloud = located(&self.positions, hints.origin);
         let count = cloud.len();
 
-        if cloud.origin != DVec3::ZERO {
-            let DVec3 { x, y, z } = cloud.origin;
-            assumptions
-                .push(format!("the points lie far from zero: they are kept relative to ({x}, {y}, {z})"));
-        }
-        cloud.oriented = self.normals.is_some() && header.oriented != Some(false);
+        assumptions.extend(far_from_zero(&cloud));
+        cloud.oriented = self.normals.is_some() && hints.oriented != Some(false);
         assumptions.push(match (&self.normals, cloud.oriented) {
             (None, _) => "no normals: they are unknown".to_owned(),
             (Some(_), true) => "the normals are taken as oriented: they point outwards".to_owned(),
@@ -132,6 +191,7 @@ impl Columns {
         cloud.opacities = self.opacities;
         cloud.areas = self.areas;
         cloud.texture_coordinates = self.texture_coordinates;
+        cloud.fields = self.fields;
         Outcome { cloud, usages: self.roles.usages, assumptions, color_assumptions }
     }
 
@@ -172,55 +232,11 @@ impl Columns {
     }
 }
 
-impl Rows for Columns {
-    fn slots(&self) -> &[Option<usize>] {
-        &self.roles.slots
-    }
-
-    fn width(&self) -> usize {
-        SLOTS
-    }
-
-    fn count(&self) -> usize {
-        self.count
-    }
-
-    fn push(&mut self, row: &[f64]) {
-        let triple = |slot: usize| DVec3::new(row[slot], row[slot + 1], row[slot + 2]);
-        self.positions.push(triple(POSITION.start));
-        if let Some(normals) = &mut self.normals {
-            normals.push(unit(triple(NORMAL.start)));
-        }
-        if let Some(colors) = &mut self.colors {
-            let channel = |channel: usize| self.tones[channel].linear(row[COLOR.start + channel]);
-            let color = Vec3::new(channel(0), channel(1), channel(2));
-            self.greatest_color = self.greatest_color.max(color.max_element());
-            colors.push(color);
-        }
-        if let Some(opacities) = &mut self.opacities {
-            let mut opacity = row[OPACITY] * self.opacity_scale;
-            if opacity.is_finite() && !(0.0..=1.0).contains(&opacity) {
-                opacity = opacity.clamp(0.0, 1.0);
-                self.clamped_opacities += 1;
-            }
-            opacities.push(opacity as f32);
-        }
-        if let Some(sizes) = &mut self.sizes {
-            sizes.push(row[SIZE] as f32);
-        }
-        if let Some(areas) = &mut self.areas {
-            areas.push(row[AREA] as f32);
-        }
-        if let Some(tangents) = &mut self.tangents {
-            let [u, v] = [TANGENTS.start, TANGENTS.start + 3].map(triple);
-            tangents.push([u.as_vec3(), v.as_vec3()]);
-        }
-        if let Some(coordinates) = &mut self.texture_coordinates {
-            let pair = |slot: usize| Vec2::new(row[slot] as f32, row[slot + 1] as f32);
-            let [per_u, per_v] = [0, 2].map(|first| pair(TEXTURE_DERIVATIVES.start + first));
-            coordinates.push(TextureCoordinates { center: pair(TEXTURE.start), per_u, per_v });
-        }
-    }
+/// What is said of a cloud with an origin of its own.
+pub(crate) fn far_from_zero(cloud: &Cloud) -> Option<String> {
+    let DVec3 { x, y, z } = cloud.origin;
+    (cloud.origin != DVec3::ZERO)
+        .then(|| format!("the points lie far from zero: they are kept relative to ({x}, {y}, {z})"))
 }
 
 /// Bare points, relative to the origin that a comment gives if that keeps every position exactly, otherwise

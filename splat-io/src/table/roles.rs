@@ -1,26 +1,36 @@
 //! What each property of a table of points means.
 
-use super::header::{Element, Kind};
-use super::scalar::Scalar;
+use super::{Element, Kind, Scalar};
 use crate::{Error, Place, Usage};
 use std::ops::Range;
 use std::path::Path;
 
-/// Number of values of a row that can be of use.
-pub(super) const SLOTS: usize = 24;
+/// Greatest number of scalar fields of a cloud; further columns are left out.
+pub(crate) const MOST_FIELDS: usize = 32;
 
-pub(super) const POSITION: Range<usize> = 0..3;
-pub(super) const NORMAL: Range<usize> = 3..6;
-pub(super) const COLOR: Range<usize> = 6..9;
-pub(super) const OPACITY: usize = 9;
-pub(super) const SIZE: usize = 10;
-pub(super) const AREA: usize = 11;
-pub(super) const TANGENTS: Range<usize> = 12..18;
-pub(super) const TEXTURE: Range<usize> = 18..20;
-pub(super) const TEXTURE_DERIVATIVES: Range<usize> = 20..24;
+/// Number of values of a row that have a meaning.
+const KNOWN: usize = 24;
+
+/// Number of values of a row that can be of use.
+pub(crate) const SLOTS: usize = KNOWN + MOST_FIELDS;
+
+/// The values of a row: a slot each, by meaning; behind them the scalar fields.
+pub(crate) type Row = [f64; SLOTS];
+
+pub(crate) const POSITION: Range<usize> = 0..3;
+pub(crate) const NORMAL: Range<usize> = 3..6;
+pub(crate) const COLOR: Range<usize> = 6..9;
+pub(crate) const OPACITY: usize = 9;
+pub(crate) const SIZE: usize = 10;
+pub(crate) const AREA: usize = 11;
+pub(crate) const TANGENTS: Range<usize> = 12..18;
+pub(crate) const TEXTURE: Range<usize> = 18..20;
+pub(crate) const TEXTURE_DERIVATIVES: Range<usize> = 20..24;
+/// The first scalar field.
+pub(crate) const FIELDS: usize = KNOWN;
 
 /// The names of each slot; the first name that is present counts.
-const NAMES: [&[&str]; SLOTS] = [
+const NAMES: [&[&str]; KNOWN] = [
     &["x"],
     &["y"],
     &["z"],
@@ -61,15 +71,17 @@ const GROUPS: [(Range<usize>, Usage); 9] = [
 ];
 
 /// The meaning of each property.
-pub(super) struct Roles {
+pub(crate) struct Roles {
     /// Per property, where its values go.
     pub slots: Vec<Option<usize>>,
     /// Per slot, the type of its property, where there is one.
-    pub kinds: [Option<Scalar>; SLOTS],
+    pub kinds: [Option<Scalar>; KNOWN],
     /// Per property, what is said of it.
     pub usages: Vec<Usage>,
     /// The name of the property that gives the size.
     pub size_name: Option<String>,
+    /// The names of the scalar fields: what is a number and means nothing else.
+    pub field_names: Vec<String>,
 }
 
 impl Roles {
@@ -82,14 +94,12 @@ impl Roles {
             Kind::Scalar(kind) => Some(kind),
             Kind::List { .. } => None,
         };
-        let mut usages: Vec<_> = properties
-            .iter()
-            .map(|property| Usage::Unused(why_unused(&property.name, property.kind)))
-            .collect();
+        let mut usages: Vec<_> =
+            properties.iter().map(|property| why_unused(&property.name, property.kind)).collect();
         let mut slots = vec![None; properties.len()];
-        let mut kinds = [None; SLOTS];
+        let mut kinds = [None; KNOWN];
         let mut size_name = None;
-        let chosen: [Option<usize>; SLOTS] = std::array::from_fn(|slot| {
+        let chosen: [Option<usize>; KNOWN] = std::array::from_fn(|slot| {
             NAMES[slot].iter().find_map(|name| {
                 let known = |index: &usize| properties[*index].name.eq_ignore_ascii_case(name);
                 (0..properties.len()).find(|index| known(index) && scalar(*index).is_some())
@@ -126,20 +136,28 @@ impl Roles {
             let expected = format!("the numbers x, y and z in element {}", element.name);
             return Err(Error::invalid(path, Place::Line(element.line), found, expected));
         }
-        Ok(Self { slots, kinds, usages, size_name })
+        let mut field_names = Vec::new();
+        for (index, property) in properties.iter().enumerate() {
+            if usages[index] == UNKNOWN && field_names.len() < MOST_FIELDS {
+                usages[index] = Usage::Field;
+                slots[index] = Some(FIELDS + field_names.len());
+                field_names.push(property.name.clone());
+            }
+        }
+        Ok(Self { slots, kinds, usages, size_name, field_names })
     }
 }
 
+/// What is said of a number without a known meaning that found no place among the scalar fields.
+const UNKNOWN: Usage = Usage::Unused("one field too many");
+
 /// Why a property that found no use has none.
-fn why_unused(name: &str, kind: Kind) -> &'static str {
-    let is = |known: &str| name.eq_ignore_ascii_case(known);
+fn why_unused(name: &str, kind: Kind) -> Usage {
     if matches!(kind, Kind::List { .. }) {
-        "a list"
-    } else if ["confidence", "quality", "intensity"].into_iter().any(is) {
-        "a measurement, not part of the picture"
-    } else if NAMES.iter().copied().flatten().copied().any(is) {
-        "another property of this meaning comes first"
+        Usage::Unused("a list")
+    } else if NAMES.iter().copied().flatten().any(|known| name.eq_ignore_ascii_case(known)) {
+        Usage::Unused("another property of this meaning comes first")
     } else {
-        "unknown"
+        UNKNOWN
     }
 }

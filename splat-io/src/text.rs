@@ -1,0 +1,202 @@
+//! Clouds as text: a point a line (XYZ, TXT, ASC, CSV, PTS).
+//!
+//! Numbers stand between blanks, tabs, commas or semicolons, with decimal points. What a column means is told by names, in
+//! a first line or in a comment before the points (`//X Y Z R G B`), as the properties of PLY files are; else by
+//! the values; or by the caller. Empty lines are passed over, and so are comments (`#`, `//`). A PTS
+//! file begins with the number of its points, which is checked.
+//!
+//! Colours are sRGB, 0 to 255, or 0 to 1 or 0 to 65535 if that is what the greatest value of the file says. Columns without
+//! a meaning become scalar fields.
+
+mod layout;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use writer::write_text;
+
+use crate::error::quoted;
+use crate::table::{Columns, Element, Hints, Kind, Outcome, Property, Row, SLOTS, Scalar, Tone};
+use crate::whole_file::{read_whole, sha256};
+use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, Usage};
+use glam::Vec3;
+use layout::{Layout, is_comment};
+use splat_core::Cloud;
+use std::path::Path;
+
+/// The name of a column that is passed over.
+pub const SKIPPED: &str = "-";
+
+/// Reads a cloud from a text file. See the [module](self) for what is understood.
+///
+/// `columns` says what the columns mean, instead of the file: `x`, `y`, `z`, `r`, `g`, `b`, `nx`, `ny`, `nz`,
+/// `radius`, any other name for a scalar field, or [`SKIPPED`].
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Unsupported`] for what is no text; [`Error::Invalid`], with the line, for a word that is no
+/// number, a row of another length than the first one, columns without x, y or z, and fewer points than the file
+/// claims; [`Error::Limit`] for more points than memory.
+pub fn read_text(path: &Path, columns: Option<&[String]>) -> Result<Import, Error> {
+    read_text_from(&read_whole(path)?, path, columns)
+}
+
+/// Reads a cloud from the bytes of a text file; `path` is its name in messages.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> Result<Import, Error> {
+    check_text(bytes, path)?;
+    let Layout { names, names_line, separator, mut claimed, rows, mut assumptions } =
+        Layout::find(bytes, path, columns)?;
+
+    let used = names.iter().filter(|&name| name != SKIPPED);
+    let properties =
+        used.map(|name| Property { name: name.clone(), kind: Kind::Scalar(Scalar::F64) }).collect();
+    // A number takes two bytes, and so does a separator with it: no claim, but what the file has.
+    let most = rows.rest().len() / (2 * names.len()) + 1;
+    let count = rows.rest().iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let mut element =
+        Element { name: "points".to_owned(), count: count.min(most) as u64, line: names_line, properties };
+    let mut columns = Columns::new(&element, path)?;
+    let mut property = 0;
+    let slots: Vec<Option<usize>> = names
+        .iter()
+        .map(|name| {
+            property += usize::from(name != SKIPPED);
+            if name == SKIPPED { None } else { columns.roles.slots[property - 1] }
+        })
+        .collect();
+
+    let mut values: Row = [0.0; SLOTS];
+    let mut read = 0;
+    for (number, line) in rows {
+        if line.is_empty() || is_comment(line) {
+            continue;
+        }
+        if let Some(claim) = claimed.as_mut().filter(|_| names.len() > 1)
+            && let Some(more) = layout::count_line(line)
+        {
+            *claim = claim.saturating_add(more);
+            continue;
+        }
+        let mut words = separator.split(line);
+        for (slot, name) in slots.iter().zip(&names) {
+            let place = Place::Line(number);
+            let Some(word) = words.next() else {
+                let expected = format!("{} numbers, as in the first row: {name} is missing", names.len());
+                return Err(Error::invalid(path, place, "the end of the line", expected));
+            };
+            if let Some(slot) = *slot {
+                values[slot] = Scalar::F64.parse(word).map_err(|expected| {
+                    let expected = format!("{expected} with a decimal point for {name}");
+                    Error::invalid(path, place, quoted(word), expected)
+                })?;
+            }
+        }
+        if let Some(word) = words.next().filter(|word| !word.is_empty()) {
+            let expected = format!("the end of a row of {} numbers", names.len());
+            return Err(Error::invalid(path, Place::Line(number), quoted(word), expected));
+        }
+        columns.push(&values);
+        read += 1;
+    }
+    check_claim(claimed, read, path, &mut assumptions)?;
+
+    element.count = read;
+    let mut outcome = columns.finish(Hints::default());
+    let tone = outcome.cloud.colors.as_deref_mut().map(linearise);
+    assumptions.append(&mut outcome.assumptions);
+    assumptions.extend(tone);
+    // What is said of colours there is not true of these, which are not linear.
+    assumptions.extend(outcome.color_assumptions.drain(..).filter(|line| line.contains("opacities")));
+    let element = report(&names, &element, &outcome);
+    let cloud: Cloud = outcome.cloud;
+    let report = ImportReport {
+        path: path.to_owned(),
+        format: format!("text, numbers between {}", separator.describe()),
+        bytes: bytes.len() as u64,
+        sha256: sha256(bytes),
+        elements: vec![element],
+        assumptions,
+    };
+    Ok(Import { cloud, report })
+}
+
+/// Refuses what is certainly no text.
+fn check_text(bytes: &[u8], path: &Path) -> Result<(), Error> {
+    if bytes.is_empty() {
+        return Err(Error::invalid(path, Place::File, "an empty file", "a cloud"));
+    }
+    let head = &bytes[..bytes.len().min(4096)];
+    if head.contains(&0) {
+        let found = format!(
+            "a file of a kind that is not known (it begins with {})",
+            quoted(&head[..head.len().min(8)])
+        );
+        let expected = "PLY, LAS, LAZ, PCD, or text with a point a line";
+        return Err(Error::unsupported(path, found, expected));
+    }
+    Ok(())
+}
+
+/// Holds the number of points that the file claims against the number that it has.
+fn check_claim(
+    claimed: Option<u64>,
+    read: u64,
+    path: &Path,
+    assumptions: &mut Vec<String>,
+) -> Result<(), Error> {
+    match claimed {
+        Some(claimed) if read < claimed => {
+            let expected = format!("{claimed} points, as the file says");
+            Err(Error::invalid(path, Place::File, format!("{read} points"), expected))
+        }
+        Some(claimed) if read > claimed => {
+            assumptions.push(format!("the file says {claimed} points and has {read}: all are kept"));
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Makes colours linear, and says how.
+fn linearise(colors: &mut [Vec3]) -> String {
+    let channels = || colors.iter().flat_map(|color| color.to_array()).filter(|value| value.is_finite());
+    let greatest = channels().fold(0.0, f32::max);
+    let is_whole = channels().all(|value| value.fract() == 0.0);
+    let (range, tone) = match greatest {
+        ..=1.0 => (1.0, None),
+        ..=255.0 => (255.0, is_whole.then_some(Tone::Srgb8)),
+        _ => (65535.0, is_whole.then_some(Tone::Srgb16)),
+    };
+    let linear = |value: f32| match tone {
+        _ if !value.is_finite() => value,
+        Some(tone) => tone.linear(f64::from(value)),
+        None => splat_core::srgb::decode((f64::from(value) / range).clamp(0.0, 1.0)) as f32,
+    };
+    for color in colors.iter_mut() {
+        *color = color.map(linear);
+    }
+    format!("the colours, {greatest} at most, are taken as sRGB from 0 to {range} and linearised")
+}
+
+/// What is said of the columns, those that are passed over included.
+fn report(names: &[String], element: &Element, outcome: &Outcome) -> ElementReport {
+    let mut usages = outcome.usages.iter().copied();
+    let mut usage = |name: &str| match name {
+        SKIPPED => Some(Usage::Unused("not wanted")),
+        _ => usages.next(),
+    };
+    ElementReport {
+        name: element.name.clone(),
+        count: element.count,
+        is_points: true,
+        properties: names
+            .iter()
+            .filter_map(|name| {
+                let usage = usage(name)?;
+                Some(PropertyReport { name: name.clone(), kind: "text".to_owned(), usage })
+            })
+            .collect(),
+    }
+}
