@@ -246,18 +246,23 @@ impl Resolver {
 
     /// `over`: a layer for each fragment that can be seen, nearest first.
     fn one_layer_each(&mut self, fragments: &[Fragment], surface_of: impl Fn(&Fragment) -> SplatSurface) {
-        self.layers.clear();
         self.layer_of.clear();
         self.layer_of.extend(0..fragments.len() as u32);
-        for (number, fragment) in fragments.iter().enumerate() {
+        // By depth; fragments come in splat order, so their number decides as their rank would.
+        self.order.clear();
+        let keys = fragments.iter().enumerate();
+        self.order.extend(keys.map(|(i, fragment)| near_end_key(false, fragment.depth, i)));
+        self.order.sort_unstable();
+        self.layers.clear();
+        for &key in &self.order {
+            let number = (key & u64::from(MAX_RANK)) as usize;
+            let fragment = &fragments[number];
             let mut layer = Layer::new(number as u32, fragment.is_back());
             layer.add(fragment, &surface_of(fragment));
             if layer.weight_opacity >= MIN_ALPHA {
                 self.layers.push(layer);
             }
         }
-        self.layers
-            .sort_unstable_by(|a, b| a.nearest.total_cmp(&b.nearest).then(a.least_rank.cmp(&b.least_rank)));
     }
 
     /// Lays the sorted layers over each other, front to back. `cover` gives a layer's coverage and opacity.

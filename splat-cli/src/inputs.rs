@@ -4,9 +4,7 @@ use crate::arguments::DEFAULT_POINTS;
 use crate::arguments::ReadArguments;
 use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
-use glam::{DVec3, Vec3};
-use splat_core::harmonics::{constant_term, terms};
-use splat_core::{Cloud, Field, Shapes, SphericalHarmonics, srgb};
+use splat_core::Cloud;
 use splat_io::{
     CloudFormat, CloudOptions, Import, ImportReport, MeshImport, Sampled, cloud_format, ply_has_faces,
     read_cloud, read_obj, read_ply_mesh, sample_surface,
@@ -64,37 +62,13 @@ pub fn read(
     let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
     let (clouds, reports): (Vec<Cloud>, Vec<ImportReport>) =
         imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
-    let named: Vec<(&Path, Cloud)> = reports.iter().map(|report| report.path.as_path()).zip(clouds).collect();
-    let mut cloud = join(named)?;
+    let mut cloud = Cloud::join(clouds)?;
     if let Some(classes) = &reading.classes {
         let field = cloud.field("classification").context("--classes: the points have no classification")?;
         let kept: Vec<usize> = (0..cloud.len()).filter(|&index| classes.has(field.values[index])).collect();
-        cloud = only(&cloud, &kept);
+        cloud = cloud.only(&kept);
     }
     Ok((cloud, reports))
-}
-
-/// The cloud of some of a cloud's splats.
-fn only(cloud: &Cloud, kept: &[usize]) -> Cloud {
-    fn pick<T: Copy>(values: &[T], kept: &[usize]) -> Vec<T> {
-        if values.is_empty() { Vec::new() } else { kept.iter().map(|&index| values[index]).collect() }
-    }
-    let field = |field: &Field| Field { name: field.name.clone(), values: pick(&field.values, kept) };
-    Cloud {
-        origin: cloud.origin,
-        positions: pick(&cloud.positions, kept),
-        normals: pick(&cloud.normals, kept),
-        shapes: match &cloud.shapes {
-            Shapes::Discs(sizes) => Shapes::Discs(pick(sizes, kept)),
-            Shapes::Ellipses(axes) => Shapes::Ellipses(pick(axes, kept)),
-        },
-        colors: cloud.colors.as_ref().map(|values| pick(values, kept)),
-        opacities: cloud.opacities.as_ref().map(|values| pick(values, kept)),
-        areas: cloud.areas.as_ref().map(|values| pick(values, kept)),
-        texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, kept)),
-        oriented: cloud.oriented,
-        fields: cloud.fields.iter().map(field).collect(),
-    }
 }
 
 /// Whether a file is an OBJ mesh, by its name.
@@ -137,97 +111,6 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
     Ok(Import { cloud, report })
 }
 
-/// Joins clouds, each with its name for messages.
-///
-/// All must have normals or none, colours or none, and the same kind of shape, since what one lacks cannot be
-/// told from another. Missing opacities are opaque; colours that do not depend on the view stay so; areas, texture
-/// coordinates and scalar fields are kept only if every cloud has them.
-fn join(mut clouds: Vec<(&Path, Cloud)>) -> anyhow::Result<Cloud> {
-    if clouds.len() > 1 {
-        clouds.retain(|(_, cloud)| !cloud.is_empty());
-    }
-    if clouds.len() < 2 {
-        return Ok(clouds.pop().map(|(_, cloud)| cloud).unwrap_or_default());
-    }
-    let worlds =
-        clouds.iter().flat_map(|(_, cloud)| (0..cloud.len()).map(|index| cloud.world_position(index)));
-    let mut joined = Cloud::from_points(&worlds.collect::<Vec<DVec3>>());
-    let normals = |cloud: &Cloud| Some(cloud.normals.clone()).filter(|normals| !normals.is_empty());
-    joined.normals = all_or_none(&clouds, "normals", normals)?.unwrap_or_default();
-    joined.colors = all_or_none(&clouds, "colours", |cloud| cloud.colors.clone())?;
-    joined.harmonics = join_harmonics(&clouds)?;
-    joined.trained = clouds.iter().all(|(_, cloud)| cloud.trained);
-    if clouds.iter().any(|(_, cloud)| cloud.opacities.is_some()) {
-        let opacities = |cloud: &Cloud| cloud.opacities.clone().unwrap_or_else(|| vec![1.0; cloud.len()]);
-        joined.opacities = Some(clouds.iter().flat_map(|(_, cloud)| opacities(cloud)).collect());
-    }
-    joined.areas =
-        clouds.iter().map(|(_, cloud)| cloud.areas.clone()).collect::<Option<Vec<_>>>().map(|a| a.concat());
-    let coordinates = clouds.iter().map(|(_, cloud)| cloud.texture_coordinates.clone());
-    joined.texture_coordinates = coordinates.collect::<Option<Vec<_>>>().map(|parts| parts.concat());
-    let fields = clouds[0].1.fields.iter().filter_map(|Field { name, .. }| {
-        let parts: Option<Vec<_>> =
-            clouds.iter().map(|(_, cloud)| cloud.field(name).map(|field| field.values.as_slice())).collect();
-        Some(Field { name: name.clone(), values: parts?.concat() })
-    });
-    joined.fields = fields.collect();
-    joined.oriented = clouds.iter().all(|(_, cloud)| cloud.oriented);
-    let discs = all_or_none(&clouds, "round splats", |cloud| match &cloud.shapes {
-        Shapes::Discs(sizes) => Some(sizes.clone()),
-        Shapes::Ellipses(_) => None,
-    })?;
-    let ellipses = all_or_none(&clouds, "elliptical splats", |cloud| match &cloud.shapes {
-        Shapes::Discs(_) => None,
-        Shapes::Ellipses(axes) => Some(axes.clone()),
-    })?;
-    joined.shapes =
-        discs.map(Shapes::Discs).or(ellipses.map(Shapes::Ellipses)).context("clouds of no shape")?;
-    Ok(joined)
-}
-
-/// The harmonics of all clouds, of the greatest degree; `None` if no cloud has any. All or none have colours.
-fn join_harmonics(clouds: &[(&Path, Cloud)]) -> anyhow::Result<Option<SphericalHarmonics>> {
-    let degrees = clouds.iter().filter_map(|(_, cloud)| Some(cloud.harmonics.as_ref()?.degree()));
-    let Some(degree) = degrees.max() else { return Ok(None) };
-    let mut coefficients = Vec::new();
-    for (_, cloud) in clouds {
-        for index in 0..cloud.len() {
-            let start = coefficients.len();
-            match (&cloud.harmonics, &cloud.colors) {
-                (Some(harmonics), _) => coefficients.extend_from_slice(harmonics.of(index)),
-                (None, Some(colors)) => {
-                    let term = |linear: f32| constant_term(srgb::encode(linear.into()) as f32);
-                    coefficients.push(Vec3::from_array(colors[index].to_array().map(term)));
-                }
-                (None, None) => {}
-            }
-            coefficients.resize(start + terms(degree), Vec3::ZERO);
-        }
-    }
-    Ok(Some(SphericalHarmonics::new(degree, coefficients)?))
-}
-
-/// One property of all clouds, one after the other; `None` if no cloud has it.
-fn all_or_none<T: Clone>(
-    clouds: &[(&Path, Cloud)],
-    what: &str,
-    property: impl Fn(&Cloud) -> Option<Vec<T>>,
-) -> anyhow::Result<Option<Vec<T>>> {
-    let with = clouds.iter().position(|(_, cloud)| property(cloud).is_some());
-    let without = clouds.iter().position(|(_, cloud)| property(cloud).is_none());
-    if let (Some(with), Some(without)) = (with, without) {
-        let [with, without] = [with, without].map(|index| clouds[index].0.display());
-        bail!(
-            "{without}: found no {what}, expected some as in {with}: such clouds cannot be rendered as one"
-        );
-    }
-    Ok(clouds
-        .iter()
-        .map(|(_, cloud)| property(cloud))
-        .collect::<Option<Vec<_>>>()
-        .map(|parts| parts.concat()))
-}
-
 /// Checks that at least one splat of a prepared cloud can be rendered.
 ///
 /// # Errors
@@ -249,6 +132,8 @@ pub fn check_usable(cloud: &Cloud, reports: &[ImportReport]) -> anyhow::Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::{DVec3, Vec3};
+    use splat_core::Shapes;
 
     fn cloud(at: DVec3, count: usize) -> Cloud {
         let points: Vec<DVec3> = (0..count).map(|i| at + DVec3::X * i as f64).collect();
@@ -256,78 +141,6 @@ mod tests {
         cloud.normals = vec![Vec3::Z; count];
         cloud.oriented = true;
         cloud
-    }
-
-    fn joined(clouds: Vec<Cloud>) -> anyhow::Result<Cloud> {
-        join(clouds.into_iter().map(|cloud| (Path::new("a.ply"), cloud)).collect())
-    }
-
-    #[test]
-    fn clouds_are_joined_in_order_and_far_from_zero() {
-        let (first, second) = (DVec3::new(5e5, 5e6, 0.0), DVec3::new(5e5, 5e6, 9.0));
-        let field = |name: &str, values: &[f32]| Field { name: name.to_owned(), values: values.to_vec() };
-        let mut other = cloud(second, 3);
-        other.opacities = Some(vec![0.5; 3]);
-        other.fields = vec![field("time", &[0.0; 3]), field("Intensity", &[3.0, 4.0, 5.0])];
-        let mut one = cloud(first, 2);
-        one.fields = vec![field("intensity", &[1.0, 2.0]), field("class", &[0.0; 2])];
-        let all = joined(vec![one, other]).unwrap();
-        assert_eq!(all.fields, [field("intensity", &[1.0, 2.0, 3.0, 4.0, 5.0])]);
-        assert!(all.check_lengths().is_ok() && all.oriented);
-        assert_eq!(all.world_position(1), first + DVec3::X);
-        assert_eq!(all.world_position(2), second);
-        assert_eq!(all.opacities, Some(vec![1.0, 1.0, 0.5, 0.5, 0.5]));
-        assert_eq!(all.areas, None);
-    }
-
-    #[test]
-    fn one_cloud_stays_what_it_is_and_empty_ones_say_nothing() {
-        let one = cloud(DVec3::ONE, 2);
-        assert_eq!(joined(vec![one.clone()]).unwrap(), one);
-        assert_eq!(joined(vec![Cloud::default(), one.clone()]).unwrap(), one);
-        assert_eq!(joined(vec![Cloud::default(), Cloud::default()]).unwrap(), Cloud::default());
-    }
-
-    #[test]
-    fn some_of_a_cloud_is_a_cloud() {
-        let mut whole = cloud(DVec3::new(5e5, 5e6, 0.0), 4);
-        whole.colors = Some((0..4).map(|i| Vec3::splat(i as f32)).collect());
-        whole.fields = vec![Field { name: "classification".to_owned(), values: vec![2.0, 7.0, 6.0, 18.0] }];
-        let some = only(&whole, &[0, 2]);
-        assert!(some.check_lengths().is_ok());
-        assert_eq!(some.world_position(1), whole.world_position(2));
-        assert_eq!(some.fields[0].values, [2.0, 6.0]);
-        assert_eq!(only(&whole, &[0, 1, 2, 3]), whole);
-    }
-
-    #[test]
-    fn clouds_that_do_not_go_together_are_refused() {
-        let plain = cloud(DVec3::ZERO, 2);
-        let coloured = Cloud { colors: Some(vec![Vec3::ONE; 2]), ..plain.clone() };
-        let bare = Cloud { normals: Vec::new(), ..plain.clone() };
-        let ellipses = Cloud { shapes: Shapes::Ellipses(vec![[Vec3::X, Vec3::Y]; 2]), ..plain.clone() };
-        for (other, what) in [(coloured, "colours"), (bare, "normals"), (ellipses, "splats")] {
-            let message = joined(vec![plain.clone(), other]).unwrap_err().to_string();
-            assert!(message.contains(what), "{message}");
-        }
-    }
-
-    #[test]
-    fn colours_by_direction_are_joined_with_others() {
-        let mut plain = cloud(DVec3::ZERO, 1);
-        plain.colors = Some(vec![Vec3::new(1.0, 0.0, 0.25)]);
-        let degree_1 = vec![Vec3::ONE, Vec3::X, Vec3::Y, Vec3::Z];
-        let mut trained = Cloud { trained: true, ..plain.clone() };
-        trained.harmonics = Some(SphericalHarmonics::new(1, degree_1.clone()).unwrap());
-        let all = joined(vec![trained.clone(), plain.clone()]).unwrap();
-        assert!(all.check_lengths().is_ok() && !all.trained);
-        let harmonics = all.harmonics.unwrap();
-        assert_eq!(harmonics.of(0), degree_1);
-        let color = Vec3::from_array(harmonics.color(1, Vec3::X));
-        let expected = Vec3::new(1.0, 0.0, srgb::encode(0.25) as f32);
-        assert!(color.abs_diff_eq(expected, 1e-6), "{color}");
-        assert!(joined(vec![trained.clone(), trained]).unwrap().trained);
-        assert_eq!(joined(vec![plain.clone(), plain]).unwrap().harmonics, None);
     }
 
     #[test]

@@ -145,6 +145,35 @@ fn the_engines_write_the_same_file() {
 }
 
 #[test]
+fn trained_splats_have_defaults_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Binary).unwrap();
+    succeeds(folder.path(), "convert in.ply -o in.splat");
+    succeeds(folder.path(), "convert in.splat -o back.ply");
+    let render = |line: &str| {
+        let said = succeeds(folder.path(), &format!("render {line} -o out.png --size 80x60 --spp 4 -v"));
+        let said = String::from_utf8_lossy(&said.stderr).into_owned();
+        (read_png(&folder.path().join("out.png")), said)
+    };
+    let (trained, said) = render("in.splat");
+    assert!(said.contains("blended one by one") && said.contains("y is down"), "{said}");
+    let given = "--resolve over --kernel gaussian --cutoff 9 --up -y --shading color --background none";
+    assert_eq!(trained, render(&format!("in.splat {given}")).0);
+    assert_eq!(trained, render("back.ply").0, "the cloud's own format remembers");
+    assert_eq!(trained, render("in.splat --engine both").0);
+    for other in ["--resolve surface", "--coverage opaque", "--up y"] {
+        assert_ne!(trained, render(&format!("in.splat {other}")).0, "{other}");
+    }
+    assert_ne!(trained, render("in.splat in.ply").0);
+    let info = succeeds(folder.path(), "info in.splat --json");
+    assert!(String::from_utf8_lossy(&info.stdout).contains("\"trained\": true"));
+
+    fs::write(folder.path().join("a.ksplat"), [0; 5000]).unwrap();
+    assert!(fails(folder.path(), "render a.ksplat -o out.png", 1).contains(".ksplat is not supported"));
+    assert!(fails(folder.path(), "convert in.ply -o out.spz", 2).contains(".ply or .splat"));
+}
+
+#[test]
 fn exit_codes_and_messages_tell_who_is_to_blame() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(
@@ -351,7 +380,8 @@ fn real_files_are_rendered_or_refused_and_never_a_panic() {
     let Some(data) = real_files() else { return };
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.png");
-    for entry in fs::read_dir(data.join("tricky_ply")).unwrap() {
+    let folders = ["tricky_ply", "splats"].map(|name| fs::read_dir(data.join(name)).unwrap());
+    for entry in folders.into_iter().flatten() {
         let path = entry.unwrap().path();
         let run = Command::new(PROGRAM)
             .args(["render", "--size", "64x48", "--spp", "4", "-o"])

@@ -59,6 +59,12 @@ impl SphericalHarmonics {
         &self.coefficients[index * terms..][..terms]
     }
 
+    /// Those of some splats, in this order.
+    pub fn only(&self, kept: &[usize]) -> Self {
+        let coefficients = kept.iter().flat_map(|&index| self.of(index)).copied().collect();
+        Self { degree: self.degree, coefficients }
+    }
+
     /// Whether all coefficients of a splat are finite.
     pub fn is_finite(&self, index: usize) -> bool {
         self.of(index).iter().all(|coefficient| coefficient.is_finite())

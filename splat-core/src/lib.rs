@@ -10,6 +10,7 @@ pub mod evaluate;
 pub mod film;
 pub mod fit;
 pub mod harmonics;
+mod join;
 pub mod kernel;
 pub mod options;
 pub mod pixel;

@@ -48,6 +48,9 @@ impl Cloud {
                 *area = (f64::from(*area) * growth) as f32;
             }
         }
+        if let Some(harmonics) = &mut self.harmonics {
+            harmonics.turn(&linear);
+        }
         for normal in &mut self.normals {
             *normal = (cofactors * normal.as_dvec3()).normalize_or_zero().as_vec3();
         }

@@ -39,6 +39,7 @@ pub use cameras::{
     read_cameras_with, write_camera_json, write_cameras_json,
 };
 pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
+pub use decimals::decimals;
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_aov_files, write_exr};
 pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};

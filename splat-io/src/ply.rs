@@ -20,9 +20,10 @@
 //! types as 8-bit levels, clamped to 0 to 255.
 //!
 //! Other numbers (`confidence`, `quality`, `intensity`) become scalar fields of the cloud, the first 32 of them. All else
-//! (lists, faces) is reported as not used. ([`crate::read_ply_mesh`] reads the faces, too.) Two comments that [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a
-//! file are oriented unless it says 0) and `comment splat origin X Y Z` (the cloud's origin, used if it keeps
-//! every position exactly).
+//! (lists, faces) is reported as not used. ([`crate::read_ply_mesh`] reads the faces, too.) Three comments that
+//! [`write_ply`] leaves are understood: `comment splat oriented 0|1` (normals from a file are oriented unless it says 0),
+//! `comment splat trained 1` ([`splat_core::Cloud::trained`]) and `comment splat origin X Y Z` (the cloud's origin, used if
+//! it keeps every position exactly). PLY files of trained Gaussian splats have properties of their own: [`crate::trained`].
 //!
 //! ASCII numbers are read with the precision of `f64` whatever type is declared, since many programs declare
 //! `float` and write more digits. A row is a line; blank lines between rows are skipped.
@@ -86,7 +87,7 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
     let mut source = Source::new(reader, size, path);
     let header = Header::read(&mut source)?;
     let points = &header.elements[header.points(path)?];
-    if gaussians::is_trained(points) || compressed::is_packed(points) {
+    if trained::holds_splats(points) {
         return trained::read(&header, source);
     }
     let mut tables = Surfels::new(&header, false, &source)?;
@@ -94,7 +95,9 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
     let points = tables.points;
     let (sha256, bytes) = source.finish()?;
 
-    let Outcome { cloud, usages, mut assumptions, color_assumptions } = tables.columns.finish(header.hints());
+    let Outcome { mut cloud, usages, mut assumptions, color_assumptions } =
+        tables.columns.finish(header.hints());
+    cloud.trained = header.trained;
     assumptions.extend(color_assumptions);
     for (index, other) in header.elements.iter().enumerate().filter(|(_, other)| other.count > 0) {
         if index != points {

@@ -3,9 +3,7 @@
 use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::prepare::{PrepareOptions, prepare};
-use splat_core::{
-    Camera, Cloud, Field, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes, SphericalHarmonics,
-};
+use splat_core::{Camera, Cloud, Kernel, Lens, PixelFilter, Projection, RenderOptions, Shapes};
 
 use crate::random::Random;
 
@@ -56,33 +54,7 @@ pub fn cloud(surfels: &[Surfel]) -> Cloud {
 
 /// The cloud with its points in another order: point i is the old point `order[i]`.
 pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
-    fn pick<T: Copy>(values: &[T], order: &[usize]) -> Vec<T> {
-        order.iter().map(|&i| values[i]).collect()
-    }
-    Cloud {
-        origin: cloud.origin,
-        positions: pick(&cloud.positions, order),
-        normals: pick(&cloud.normals, order),
-        shapes: match &cloud.shapes {
-            Shapes::Discs(sizes) => Shapes::Discs(pick(sizes, order)),
-            Shapes::Ellipses(axes) => Shapes::Ellipses(pick(axes, order)),
-        },
-        colors: cloud.colors.as_ref().map(|values| pick(values, order)),
-        harmonics: cloud.harmonics.as_ref().map(|harmonics| {
-            let coefficients = order.iter().flat_map(|&i| harmonics.of(i).to_vec()).collect();
-            SphericalHarmonics::new(harmonics.degree(), coefficients).expect("whole splats")
-        }),
-        opacities: cloud.opacities.as_ref().map(|values| pick(values, order)),
-        areas: cloud.areas.as_ref().map(|values| pick(values, order)),
-        texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
-        oriented: cloud.oriented,
-        trained: cloud.trained,
-        fields: cloud
-            .fields
-            .iter()
-            .map(|field| Field { name: field.name.clone(), values: pick(&field.values, order) })
-            .collect(),
-    }
+    cloud.only(order)
 }
 
 /// Evenly spread points of the unit sphere (a Fibonacci lattice).

@@ -10,7 +10,7 @@ use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::setup::{View, set_up, sort_keys};
 use splat_core::{
     AovSelection, Camera, Cloud, Film, Kernel, Lens, PatternKind, PixelFilter, Projection, RenderOptions,
-    Shading, Shapes, TableMode, render,
+    Shading, Shapes, SphericalHarmonics, TableMode, render,
 };
 use splat_tests::textures::any_f32;
 
@@ -38,6 +38,7 @@ fn vector(number: impl Strategy<Value = f32> + Clone) -> impl Strategy<Value = V
 fn cloud(number: impl Strategy<Value = f32> + Clone + 'static) -> impl Strategy<Value = Cloud> {
     let vectors = vec(vector(number.clone()), N);
     let numbers = vec(number.clone(), N);
+    let coefficients = vec(vector(number.clone()), 4 * N);
     let axes = vec((vector(number.clone()), vector(number)), N);
     let shapes = prop_oneof![
         numbers.clone().prop_map(Shapes::Discs),
@@ -47,22 +48,27 @@ fn cloud(number: impl Strategy<Value = f32> + Clone + 'static) -> impl Strategy<
     (
         origin,
         (vectors.clone(), vectors.clone(), shapes),
-        option::of(vectors),
+        (option::of(vectors), option::of(coefficients)),
         option::of(numbers.clone()),
         option::of(numbers),
         any::<bool>(),
     )
-        .prop_map(|(origin, (positions, normals, shapes), colors, opacities, areas, oriented)| Cloud {
-            origin,
-            positions,
-            normals,
-            shapes,
-            colors,
-            opacities,
-            areas,
-            oriented,
-            ..Cloud::default()
-        })
+        .prop_map(
+            |(origin, (positions, normals, shapes), (colors, coefficients), opacities, areas, oriented)| {
+                Cloud {
+                    origin,
+                    positions,
+                    normals,
+                    shapes,
+                    colors,
+                    harmonics: coefficients.map(|all| SphericalHarmonics::new(1, all).expect("whole splats")),
+                    opacities,
+                    areas,
+                    oriented,
+                    ..Cloud::default()
+                }
+            },
+        )
 }
 
 /// Any camera that passes its own check: matrices with scale, mirror and shear, all of them of any size.

@@ -45,7 +45,7 @@ pub const BOX_PADDING: f64 = 1.0 / 64.0;
 
 /// Linear colour of splats without one: white as a plain colour, light grey under the headlight.
 const UNCOLORED: [f32; 3] = [1.0; 3];
-const UNCOLORED_LIT: [f32; 3] = [0.6; 3];
+pub(crate) const UNCOLORED_LIT: [f32; 3] = [0.6; 3];
 
 /// Light that reaches a surface seen edge-on, relative to one that faces the headlight.
 const HEADLIGHT_AMBIENT: f64 = 0.04;

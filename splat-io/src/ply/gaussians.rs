@@ -46,12 +46,16 @@ impl Splats {
         let mut slots = vec![None; element.properties.len()];
         let mut usages = vec![Usage::Unused("unknown"); slots.len()];
         for (index, property) in element.properties.iter().enumerate() {
-            if let Some(slot) = NAMES.iter().position(|name| *name == property.name) {
+            if matches!(property.kind, Kind::List { .. }) {
+                usages[index] = Usage::Unused("a list");
+            } else if let Some(slot) = NAMES.iter().position(|name| *name == property.name) {
                 slots[index] = Some(slot);
                 usages[index] = usage(slot);
             } else if let Some((term, channel)) = rest.place(&property.name) {
                 slots[index] = Some(REST + 3 * (term - 1) + channel);
                 usages[index] = Usage::Harmonic;
+            } else if property.name.starts_with("f_rest_") {
+                usages[index] = Usage::Unused("of a degree above 3");
             } else if ["nx", "ny", "nz"].contains(&property.name.as_str()) {
                 usages[index] = Usage::Unused("the shape tells the normal");
             }
@@ -125,7 +129,8 @@ pub(super) struct Rest {
 impl Rest {
     /// Counts the properties.
     pub fn find(element: &Element, path: &Path) -> Result<Self, Error> {
-        let count = (0..).take_while(|i| position(element, &format!("f_rest_{i}")).is_some()).count();
+        // More than any degree has, but no long search in a header of nothing else.
+        let count = (0..1000).take_while(|i| position(element, &format!("f_rest_{i}")).is_some()).count();
         let degree = (0..=8).find(|&degree| 3 * (terms(degree) - 1) == count).ok_or_else(|| {
             let found = format!("{count} properties f_rest_0, f_rest_1, .. in element {}", element.name);
             Error::invalid(path, Place::Line(element.line), found, "0, 9, 24 or 45")

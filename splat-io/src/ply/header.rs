@@ -38,6 +38,8 @@ pub(super) struct Header {
     pub next_line: u64,
     /// What a comment `splat oriented` says.
     pub oriented: Option<bool>,
+    /// Whether a comment `splat trained` says so.
+    pub trained: bool,
     /// What a comment `splat origin` says; finite.
     pub origin: Option<DVec3>,
 }

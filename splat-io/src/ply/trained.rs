@@ -1,53 +1,79 @@
 //! PLY files of trained splats, packed or not.
 
 use super::compressed::{PackedSplats, is_packed};
-use super::gaussians::Splats;
+use super::gaussians::{Splats, is_trained};
 use super::header::Header;
 use super::rows::{Rows, Table, Tables};
 use super::{read_tables, report};
 use crate::source::Source;
-use crate::{ElementReport, Error, Import, ImportReport};
+use crate::table::Element;
+use crate::trained::Gaussians;
+use crate::{Error, Import, ImportReport, Usage};
 use std::io::Read;
+
+/// Whether a table of points is one of trained splats.
+pub(super) fn holds_splats(points: &Element) -> bool {
+    is_trained(points) || is_packed(points)
+}
 
 /// Reads the tables behind a header whose table of points has trained splats.
 pub(super) fn read<R: Read>(header: &Header, mut source: Source<R>) -> Result<Import, Error> {
     let path = source.path().to_owned();
     let points = header.points(&path)?;
-    let elements: Vec<ElementReport>;
-    let (gaussians, flat, kind);
-    if is_packed(&header.elements[points]) {
-        header.check_claims(points, header.elements.len() - 1, &source)?;
-        let mut packed = PackedSplats::new(header, points, &path)?;
-        read_tables(header, &mut source, &mut packed)?;
-        let reports = header.elements.iter().enumerate();
-        let reports = reports.map(|(index, element)| report(element, packed.usages(index).as_ref()));
-        elements = reports
-            .map(|element| ElementReport {
-                is_points: element.name == header.elements[points].name,
-                ..element
-            })
-            .collect();
-        (gaussians, flat, kind) = (packed.unpack(&path)?, false, "compressed trained splats");
-    } else {
-        header.check_claims(points, points, &source)?;
-        let mut table = OneTable { index: points, rows: Splats::new(&header.elements[points], &path)? };
-        read_tables(header, &mut source, &mut table)?;
-        let splats = table.rows;
-        let reports = header.elements.iter().enumerate();
-        let usages = |index| (index == points).then_some(&splats.usages);
-        elements = reports.map(|(index, element)| report(element, usages(index))).collect();
-        (gaussians, flat, kind) = (splats.gaussians, splats.flat, "trained splats");
-    }
+    let read = if is_packed(&header.elements[points]) { read_packed } else { read_plain };
+    let splats = read(header, points, &mut source)?;
     let (sha256, bytes) = source.finish()?;
+    let elements = header.elements.iter().enumerate().map(|(index, element)| {
+        let mut report = report(element, splats.usages[index].as_ref());
+        report.is_points = index == points;
+        report
+    });
     let report = ImportReport {
         path,
-        format: format!("PLY of {kind}, {}", header.format.describe()),
+        format: format!("PLY of {}, {}", splats.kind, header.format.describe()),
         bytes,
         sha256,
-        elements,
-        assumptions: gaussians.assumptions(flat),
+        elements: elements.collect(),
+        assumptions: splats.gaussians.assumptions(splats.flat),
     };
-    Ok(Import { cloud: gaussians.finish(), report })
+    Ok(Import { cloud: splats.gaussians.finish(), report })
+}
+
+/// What was read.
+struct TrainedTables {
+    gaussians: Gaussians,
+    /// Whether they are 2DGS.
+    flat: bool,
+    kind: &'static str,
+    /// Per element, if it is used: per property.
+    usages: Vec<Option<Vec<Usage>>>,
+}
+
+fn read_plain<R: Read>(
+    header: &Header,
+    points: usize,
+    source: &mut Source<R>,
+) -> Result<TrainedTables, Error> {
+    header.check_claims(points, points, source)?;
+    let mut table = OneTable { index: points, rows: Splats::new(&header.elements[points], source.path())? };
+    read_tables(header, source, &mut table)?;
+    let Splats { gaussians, flat, usages, .. } = table.rows;
+    let mut all = vec![None; header.elements.len()];
+    all[points] = Some(usages);
+    Ok(TrainedTables { gaussians, flat, kind: "trained splats", usages: all })
+}
+
+fn read_packed<R: Read>(
+    header: &Header,
+    points: usize,
+    source: &mut Source<R>,
+) -> Result<TrainedTables, Error> {
+    header.check_claims(points, header.elements.len() - 1, source)?;
+    let mut packed = PackedSplats::new(header, points, source.path())?;
+    read_tables(header, source, &mut packed)?;
+    let usages = (0..header.elements.len()).map(|index| packed.usages(index)).collect();
+    let gaussians = packed.unpack(source.path())?;
+    Ok(TrainedTables { gaussians, flat: false, kind: "compressed trained splats", usages })
 }
 
 /// A file of which one table is wanted.

@@ -21,7 +21,7 @@ pub enum PlyEncoding {
 ///
 /// Positions are `double` if the cloud has an origin other than zero, else `float`; all else is `float`: `nx
 /// ny nz`, `radius` (sigma) or `tu_x .. tv_z`, `red green blue` (linear), `opacity`, `area`, `s t ds_du dt_du ds_dv
-/// dt_dv`, and the scalar fields under their names (blanks in them become `_`).
+/// dt_dv`, and the scalar fields under their names (blanks in them become `_`). Spherical harmonics are not written.
 /// [`crate::read_ply`] gives the same cloud, bit for bit, provided that normals are unit vectors, that
 /// opacities lie in [0, 1], and that origin + offset keeps the offsets' bits (as it does in every cloud that
 /// was made from `f64` positions).
@@ -48,6 +48,9 @@ fn write_header(out: &mut impl Write, cloud: &Cloud, encoding: PlyEncoding) -> i
     };
     writeln!(out, "ply\nformat {format} 1.0")?;
     writeln!(out, "comment splat oriented {}", u8::from(cloud.oriented))?;
+    if cloud.trained {
+        writeln!(out, "comment splat trained 1")?;
+    }
     let DVec3 { x, y, z } = cloud.origin;
     writeln!(out, "comment splat origin {} {} {}", Shortest(x), Shortest(y), Shortest(z))?;
     writeln!(out, "element vertex {}", cloud.len())?;

@@ -143,8 +143,8 @@ mod tests {
             let covariance = |direction: DVec3| {
                 [t1, t2].iter().map(|axis| axis.as_dvec3().dot(direction).powi(2)).sum::<f64>()
             };
-            for axis in 0..3 {
-                let expected = if axis == normal { 0.0 } else { scales[axis] };
+            for (axis, scale) in scales.into_iter().enumerate() {
+                let expected = if axis == normal { 0.0 } else { scale };
                 assert!((covariance(columns.col(axis)).sqrt() - expected).abs() < 1e-6);
             }
         }

@@ -232,7 +232,7 @@ fn files_cut_off_anywhere_are_an_error() {
             assert!(spz(&bytes[..length]).is_err(), "version {version}, {length} of {}", bytes.len());
         }
     }
-    let bytes = vec![0; 96];
+    let bytes = [0; 96];
     for length in (0..96).filter(|length| length % 32 != 0) {
         assert!(splat(&bytes[..length]).is_err());
         // The file system may have promised more than there is.

@@ -169,6 +169,7 @@ struct Parser {
     /// Names of the last element's properties.
     property_names: HashSet<String>,
     oriented: Option<bool>,
+    trained: bool,
     origin: Option<DVec3>,
 }
 
@@ -246,6 +247,7 @@ impl Parser {
         match words {
             [b"splat", b"oriented", b"0"] => self.oriented = Some(false),
             [b"splat", b"oriented", b"1"] => self.oriented = Some(true),
+            [b"splat", b"trained", b"1"] => self.trained = true,
             [b"splat", b"origin", x, y, z] => {
                 let number = |word: &[u8]| Scalar::F64.parse(word).ok();
                 let origin = number(x).zip(number(y)).zip(number(z));
@@ -265,6 +267,7 @@ impl Parser {
             elements: std::mem::take(&mut self.elements),
             next_line: number + 1,
             oriented: self.oriented,
+            trained: self.trained,
             origin: self.origin,
         })
     }
