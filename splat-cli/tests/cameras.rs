@@ -90,7 +90,8 @@ fn a_print_is_to_scale_and_says_its_resolution() {
     let (red, blue) = (middle(0), middle(2));
     // 10 m are 500 pixels, 5 m are 250; east is right and north is up. By 800 samples of a scatter of one pixel, at most:
     assert!((blue - red - glam::DVec2::new(500.0, -250.0)).abs().max_element() < 0.1, "{red} {blue}");
-    // Pixels begin at multiples of their size from zero: the red point, on a corner of four pixels, is one pixel, and two of margin, from the edge.
+    // Pixels begin at multiples of their size from zero: the red point, on a corner of four pixels, is one pixel and two of
+    // margin from the edge.
     assert!((red - glam::DVec2::new(3.0, 253.0)).abs().max_element() < 0.1, "{red}");
 
     // The unit of the scene changes the number of pixels, and nothing else.
@@ -98,7 +99,7 @@ fn a_print_is_to_scale_and_says_its_resolution() {
     assert!(said.contains(" 11x8 pixels"), "{said}");
     let message = refuses(folder.path(), &format!("{line} --scale 1:1"));
     assert!(message.contains("beyond the limit of 65536 a side"), "{message}");
-    assert!(message.contains("take --scale 1:2 or --dpi"), "{message}");
+    assert!(message.contains("take --scale 1:6 or --dpi 58 ("), "{message}");
     let message = refuses(folder.path(), &format!("{line} --scale 1:5"));
     assert!(message.contains("beyond the limit of 268435456 in all"), "{message}");
     succeeds(folder.path(), &format!("{line} --scale 1:5 --crop 0,0,8,8"));

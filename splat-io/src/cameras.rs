@@ -7,7 +7,7 @@
 //! | Open3D JSON: parameters, trajectory, intrinsic alone | world to camera, columns | x right, y down, z forward | at integers: cx, cy + .5 | by number |
 //! | Open3D `.log` | camera to world, rows; no intrinsics | x right, y down, z forward | at integers | by number |
 //! | 3DGS `cameras.json` | camera to world: `position`, `rotation` by rows | x right, y down, z forward | at .5 | `img_name` |
-//! | our JSON ([`read_camera_json`]), one or `{"cameras": [..]}` | world to camera, rows | x right, y down, z forward | at .5 | `name` |
+//! | our JSON ([`own`]), one or `{"cameras": [..]}` | world to camera, rows | x right, y down, z forward | at .5 | `name` |
 //!
 //! "At .5" and "z forward" are [`Camera`]'s own conventions. A COLMAP model is named by its folder (`sparse/0` in it is
 //! found) or by any of its files. A camera without a name is called `camera_0001` and so on, by its place.
@@ -16,7 +16,7 @@
 
 pub(crate) mod colmap;
 mod open3d;
-mod own;
+pub mod own;
 #[cfg(test)]
 mod tests;
 mod trained;

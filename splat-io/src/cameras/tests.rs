@@ -404,7 +404,7 @@ fn real_files_have_the_cameras_that_others_found_in_them() {
     let read = |name: &str| read(&data.join(name)).unwrap().cameras;
     assert_eq!(read("garden_colmap_text"), read("garden_colmap_bin"));
     let lego = &read("lego_transforms_train.json")[0];
-    assert_eq!(lego.name, "./train/r_0");
+    assert_eq!(lego.name, "train/r_0");
     let focal_length = 400.0 / (0.5_f64 * 0.691_111_207_008_361_8).tan();
     assert!((lego.camera.pixel_scale() - focal_length).abs().max_element() < 1e-9, "{lego:?}");
     let open3d = &read("open3d_camera.json")[0].camera;

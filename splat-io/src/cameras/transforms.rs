@@ -145,7 +145,8 @@ pub(super) fn read(text: &str, path: &Path, defaults: &CameraDefaults) -> Result
     let mut assumptions = BTreeSet::new();
     let frames = own.frames.into_iter().zip(poses.frames).enumerate();
     let cameras = frames.map(|(index, (own, pose))| {
-        let name = name_or_number(pose.file_path, index);
+        let name = pose.file_path.map(|name| name.trim_start_matches("./").to_owned());
+        let name = name_or_number(name, index);
         let fields = own.or(&shared);
         let camera = camera(&fields, &pose.transform_matrix, &name, path, defaults, &mut assumptions);
         let camera = camera.map_err(|error| error.of_camera(&name))?;
