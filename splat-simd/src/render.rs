@@ -179,6 +179,7 @@ impl Renderer {
         let counts: Vec<Statistics> = self.threads.install(|| {
             let tiles = (0..tiles.len()).into_par_iter().map(|tile| tiles.get(tile));
             tiles
+                .filter(|(_, ranks)| !ranks.is_empty())
                 .map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, &region, ranks)))
                 .collect()
         });

@@ -758,9 +758,12 @@ fn side_by_side_comparison_agrees() {
     let camera = with_lens(pinhole(101, 71, 90.0), Lens { radius: 0.1, focus: 3.0, blades: 6 });
     let known = Knowledge { orientation: true, opacities: true, areas: true, ellipses: true };
     let (cloud, _) = adversarial(140, 1, &camera, known);
+    let distortion = Some(Distortion { radial: [-0.2, 0.05, 0.0], tangential: [0.01, -0.02] });
     let options = RenderOptions::default();
-    for level in Level::available() {
-        let result = splat_simd::compare(&cloud, &camera, &options, level, &mut |_| {}).unwrap();
-        assert!(result.is_ok_and(|fragments| fragments > 10_000), "{}: {result:?}", level.name());
+    for camera in [camera.clone(), Camera { distortion, ..camera }] {
+        for level in Level::available() {
+            let result = splat_simd::compare(&cloud, &camera, &options, level, &mut |_| {}).unwrap();
+            assert!(result.is_ok_and(|fragments| fragments > 10_000), "{}: {result:?}", level.name());
+        }
     }
 }
