@@ -177,7 +177,7 @@ pub enum ColorMapChoice {
     Cividis,
     /// Black, red, yellow, white
     Inferno,
-    /// Black to white
+    /// Dark grey to white
     Gray,
 }
 
