@@ -178,7 +178,7 @@ pub enum ColorMapChoice {
     Cividis,
     /// Black, red, yellow, white
     Inferno,
-    /// Black to white
+    /// Dark grey to white
     Gray,
 }
 

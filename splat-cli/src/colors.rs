@@ -82,14 +82,17 @@ pub fn apply(
         None => robust_range(&values).with_context(|| format!("--color {what}: no point has a number"))?,
     };
     let map_name = map_name(map);
-    console.note(format_args!("colours show the {what} from {low} to {high} ({map_name}; --color-range)"));
+    let power = if is_intensity { intensity_power(&values, [low, high]) } else { 1.0 };
+    let how =
+        if power < 1.0 { format!("{map_name}, to the power of {power:.2}") } else { map_name.to_owned() };
+    console.note(format_args!("colours show the {what} from {low} to {high} ({how}; --color-range)"));
     let table: Vec<Vec3> = (0..=255).map(|i| map_color(map, f64::from(i) / 255.0)).collect();
     let color = |&value: &f32| {
         if !value.is_finite() {
             return UNKNOWN;
         }
         let share = if high > low { (f64::from(value) - low) / (high - low) } else { 0.5 };
-        table[(share.clamp(0.0, 1.0) * 255.0).round() as usize]
+        table[(libm::pow(share.clamp(0.0, 1.0), power) * 255.0).round() as usize]
     };
     cloud.colors = Some(values.iter().map(color).collect());
     Ok(format!(" --color {what} --colormap {map_name} --color-range {low}:{high}"))
@@ -116,6 +119,20 @@ fn robust_range(values: &[f32]) -> Option<[f64; 2]> {
     Some(if low < high { [low, high] } else { [at(0), at(last)] })
 }
 
+/// The power that brings the median of intensities to the middle of the colours, if it is at least 1/4: a few mirrors in a scan
+/// are a hundred times as bright as all else, which would be black.
+fn intensity_power(values: &[f32], [low, high]: [f64; 2]) -> f64 {
+    const LEAST: f64 = 0.25;
+    let mut finite: Vec<f32> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    if finite.is_empty() {
+        return 1.0;
+    }
+    let middle = finite.len() / 2;
+    let median = f64::from(*finite.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let share = (median - low) / (high - low);
+    if share > 0.0 && share < 0.5 { (libm::log(0.5) / libm::log(share)).max(LEAST) } else { 1.0 }
+}
+
 /// Directions as colours: half of each component and a half. Normals that do not tell the outside point up.
 fn normal_colors(cloud: &Cloud, up: DVec3) -> Vec<Vec3> {
     let up = up.as_vec3();
@@ -139,8 +156,8 @@ fn map_color(map: ColorMapChoice, place: f64) -> Vec3 {
         ColorMapChoice::Viridis => colorous::VIRIDIS,
         ColorMapChoice::Cividis => colorous::CIVIDIS,
         ColorMapChoice::Inferno => colorous::INFERNO,
-        // sRGB levels look evenly spaced.
-        ColorMapChoice::Gray => return Vec3::splat(srgb::decode(place) as f32),
+        // sRGB levels look evenly spaced. Black is left to what is not there.
+        ColorMapChoice::Gray => return Vec3::splat(srgb::decode(0.1 + 0.9 * place) as f32),
     };
     let colorous::Color { r, g, b } = gradient.eval_continuous(place);
     from_srgb([r, g, b])
@@ -204,6 +221,17 @@ mod tests {
         let mostly = [vec![1.0; 1000], vec![2.0]].concat();
         assert_eq!(robust_range(&mostly), Some([1.0, 2.0]));
         assert_eq!(robust_range(&[f32::NAN]), None);
+    }
+
+    #[test]
+    fn a_few_mirrors_do_not_make_all_else_black() {
+        let skewed = [vec![800.0; 90], vec![60_000.0; 10]].concat();
+        let power = intensity_power(&skewed, [0.0, 60_000.0]);
+        assert!(power == 0.25 && libm::pow(800.0 / 60_000.0, power) > 0.3, "{power}");
+        let even: Vec<f32> = (0..=100).map(|i| i as f32).collect();
+        assert_eq!(intensity_power(&even, [0.0, 100.0]), 1.0);
+        assert!((intensity_power(&even, [0.0, 200.0]) - 0.5).abs() < 1e-12);
+        assert_eq!(intensity_power(&[], [0.0, 1.0]), 1.0);
     }
 
     #[test]

@@ -64,8 +64,11 @@ pub fn read(
         imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
     let mut cloud = Cloud::join(clouds)?;
     if let Some(classes) = &reading.classes {
-        let field = cloud.field("classification").context("--classes: the points have no classification")?;
-        let kept: Vec<usize> = (0..cloud.len()).filter(|&index| classes.has(field.values[index])).collect();
+        // Class 0 is what was never classified.
+        let field = cloud.field("classification");
+        ensure!(field.is_some() || classes.has(0.0), "--classes: the points have no classification");
+        let class = |index: usize| field.map_or(0.0, |field| field.values[index]);
+        let kept: Vec<usize> = (0..cloud.len()).filter(|&index| classes.has(class(index))).collect();
         cloud = cloud.only(&kept);
     }
     Ok((cloud, reports))

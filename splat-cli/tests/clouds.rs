@@ -7,6 +7,7 @@ use splat_io::{PlyEncoding, write_ply};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_splat");
 
@@ -141,6 +142,32 @@ fn classes_are_chosen_and_left_out() {
     assert!(fails(folder.path(), "render hill.ply -o out.png --classes 9", 1).contains("empty"));
     fs::write(folder.path().join("bare.xyz"), "1 2 3\n").unwrap();
     assert!(fails(folder.path(), "render bare.xyz -o out.png --classes 2", 1).contains("no classification"));
+    succeeds(folder.path(), "convert bare.xyz -o out.las --classes !7,18");
+}
+
+#[test]
+fn claims_of_billions_of_points_fail_at_once_in_little_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    hill(folder.path(), true);
+    for name in ["hill.las", "hill.laz"] {
+        succeeds(folder.path(), &format!("convert hill.ply -o {name}"));
+        let mut bytes = fs::read(folder.path().join(name)).unwrap();
+        bytes[107..111].copy_from_slice(&4_000_000_000_u32.to_le_bytes());
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let pcd = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 4000000000\nDATA binary\n1 2 3\n";
+    fs::write(folder.path().join("hill.pcd"), pcd).unwrap();
+    fs::write(folder.path().join("hill.pts"), "4000000000\n1 2 3\n").unwrap();
+    for name in ["hill.las", "hill.laz", "hill.pcd", "hill.pts"] {
+        // The whole address space, program and libraries included, is held to 100 MB (ulimit counts in KiB).
+        let line = format!("ulimit -v 97656 && exec {PROGRAM} info {name}");
+        let start = Instant::now();
+        let output = Command::new("sh").current_dir(folder.path()).args(["-c", &line]).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{name}: {message}");
+        assert!(message.contains("4000000000"), "{message}");
+        assert!(start.elapsed() < Duration::from_secs(2), "{name}: {:?}", start.elapsed());
+    }
 }
 
 #[test]

@@ -238,9 +238,14 @@ fn read_text(
         let invalid =
             |found: String, expected: String| Err(Error::invalid(path, Place::Line(number), found, expected));
         words.clear();
-        words.extend(line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()));
+        words.extend(line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take(width + 1));
         if words.len() != width {
-            return invalid(format!("{} numbers", words.len()), format!("{width}, as FIELDS and COUNT say"));
+            let found = if words.len() > width {
+                "more numbers".to_owned()
+            } else {
+                format!("{} numbers", words.len())
+            };
+            return invalid(found, format!("{width}, as FIELDS and COUNT say"));
         }
         for (column, slot) in used {
             let field = &header.fields[column.field];

@@ -55,6 +55,10 @@ pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> 
     // A number takes two bytes, and so does a separator with it: no claim, but what the file has.
     let most = rows.rest().len() / (2 * names.len()) + 1;
     let count = rows.rest().iter().filter(|&&byte| byte == b'\n').count() + 1;
+    if count.min(most) >= u32::MAX as usize {
+        let what = format!("a text of {count} lines");
+        return Err(Error::limit(path, what, format!("{} points", u32::MAX - 1)));
+    }
     let mut element =
         Element { name: "points".to_owned(), count: count.min(most) as u64, line: names_line, properties };
     let mut columns = Columns::new(&element, path)?;

@@ -13,6 +13,9 @@ use std::path::Path;
 /// Number of rows that are looked at to tell what the columns mean.
 const SAMPLE: usize = 1000;
 
+/// Greatest length of a line of names, in bytes.
+const MOST_NAMES_BYTES: usize = 1 << 16;
+
 /// Greatest number of columns.
 const MOST_COLUMNS: usize = 64;
 
@@ -187,6 +190,7 @@ fn is_number(word: &[u8]) -> bool {
 
 /// The names in a line, if it is text; quotes and the signs of a comment taken off.
 fn names(line: &[u8]) -> Option<Vec<String>> {
+    let line = line.get(..line.len().min(MOST_NAMES_BYTES)).filter(|head| head.len() == line.len())?;
     let line = str::from_utf8(line).ok()?.trim_start_matches(['#', '/']).trim();
     let separator = match Separator::of(line.as_bytes()) {
         Separator::Blanks if line.contains('\t') => Separator::Byte(b'\t'),
