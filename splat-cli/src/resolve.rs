@@ -216,12 +216,8 @@ mod tests {
         let mut cloud = Cloud::from_points(&points);
         splat_core::prepare::prepare(
             &mut cloud,
-            &splat_core::prepare::PrepareOptions {
-                kernel: Kernel::Windowed,
-                cutoff: 4.0,
-                areas: true,
-                size_scale: 1.0,
-            },
+            &splat_core::prepare::PrepareOptions::default(),
+            &mut |_| {},
         );
         cloud
     }

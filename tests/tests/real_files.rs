@@ -111,10 +111,21 @@ fn holes_of_samples(mesh: &str, count: usize) -> Option<f64> {
 /// The share of a mesh's interior pixels in which this cloud leaves alpha below .99.
 fn share_of_holes(name: &str, mut cloud: Cloud, mesh: &[[DVec3; 3]]) -> f64 {
     let options = RenderOptions { shading: Shading::Headlight, ..RenderOptions::default() };
-    prepare(
-        &mut cloud,
-        &PrepareOptions { kernel: options.kernel, cutoff: options.cutoff, areas: true, size_scale: 1.0 },
-    );
+    let env = |name: &str, default: f64| std::env::var(name).map_or(default, |v| v.parse().unwrap());
+    let given = cloud.normals.clone();
+    if std::env::var_os("STRIP").is_some() {
+        cloud.normals.clear();
+        let sizes = if env("KEEP", 0.0) > 0.0 { cloud.shapes.clone() } else { splat_core::Shapes::Discs(vec![0.0; cloud.len()]) };
+        cloud.shapes = sizes;
+        cloud.oriented = false;
+    }
+    let orientation = if env("GRAPH", 0.0) > 0.0 { splat_core::prepare::Orientation::Graph(DVec3::Y) } else { Default::default() };
+    prepare(&mut cloud, &PrepareOptions { normals_k: env("NK", 12.0) as usize, radius_k: env("RK", 8.0) as usize, size_scale: env("SCALE", 1.0), orientation, ..PrepareOptions::default() }, &mut |_| {});
+    if !given.is_empty() {
+        let dots: Vec<f64> = given.iter().zip(&cloud.normals).map(|(a, b)| a.as_dvec3().dot(b.as_dvec3())).collect();
+        let rms = (dots.iter().map(|d| d.abs().min(1.0).acos().to_degrees().powi(2)).sum::<f64>() / dots.len() as f64).sqrt();
+        println!("normals rms {rms:.2} turned {:.4}", dots.iter().filter(|&&d| d < 0.0).count() as f64 / dots.len() as f64);
+    }
     let framing =
         Framing { width: 1280, height: 960, up: Up::Y, azimuth: 30.0, elevation: 20.0, orthographic: false };
     let camera = fit(&cloud, &framing, &options).unwrap();
@@ -124,6 +135,11 @@ fn share_of_holes(name: &str, mut cloud: Cloud, mesh: &[[DVec3; 3]]) -> f64 {
     let open = inside.iter().zip(&film.rgba).filter(|(inside, rgba)| **inside && rgba[3] < 0.99).count();
     assert!(total > 100_000, "{total} interior pixels");
     let share = open as f64 / total as f64;
+    let any = covered(mesh, &camera);
+    let solid = any.iter().filter(|&&c| c).count() as f64;
+    let alpha: f64 = film.rgba.iter().map(|c| f64::from(c[3])).sum();
+    let rim = any.iter().zip(&inside).filter(|(a, i)| **a && !**i).count() as f64;
+    println!("bloat {:.3} px", (alpha - solid) / rim - 0.5);
     #[expect(clippy::print_stdout, reason = "the measured figure, for --nocapture")]
     {
         println!("{name}: {open} of {total} interior pixels below alpha .99: {:.4} %", 100.0 * share);
