@@ -6,6 +6,7 @@ use crate::choices::{
     TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
+use crate::prepare::{PreparationArguments, PrepareArguments};
 use crate::values::{self, Background, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
 use splat_core::{AovSelection, PixelRect};
@@ -32,6 +33,10 @@ pub enum Command {
     /// of its vertices). Each surfel has an area, a normal, axes and, where the mesh has them, colour and texture
     /// coordinates. Clouds are written as they are, several as one; what they lack is estimated by render.
     Convert(ConvertArguments),
+    /// Make a cloud complete (.ply): normals, sizes, areas, stray points
+    ///
+    /// Rendering the result gives the picture of the original, without estimating again.
+    Prepare(PrepareArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
     /// Render a scene made in code, which shows what the program does
@@ -115,6 +120,9 @@ pub struct RenderArguments {
     /// What the splats look like.
     #[command(flatten, next_help_heading = "Splats")]
     pub splats: SplatArguments,
+    /// What is estimated, and how.
+    #[command(flatten, next_help_heading = "Preparation")]
+    pub preparation: PreparationArguments,
     /// Textures and surroundings.
     #[command(flatten, next_help_heading = "Material")]
     pub material: MaterialArguments,
@@ -214,9 +222,6 @@ pub struct SplatArguments {
     /// Draw the fronts of splats only
     #[arg(long)]
     pub cull: bool,
-    /// Factor on all sizes, given and estimated
-    #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
-    pub radius_scale: f64,
     /// How light falls on splats
     #[arg(long, value_name = "SHADING", default_value = "auto")]
     pub shading: ShadingChoice,

@@ -16,6 +16,7 @@ mod info;
 mod inputs;
 mod material;
 mod output;
+mod prepare;
 mod progress;
 mod render;
 mod resolve;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::Prepare(arguments) => prepare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     };

@@ -8,7 +8,7 @@ use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{describe, inputs, material, output, resolve};
+use crate::{describe, inputs, material, output, prepare as preparation, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -30,6 +30,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         output::check_file(path)?;
     }
 
+    preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
     let images = material::read(&arguments.material, console)?;
@@ -41,24 +42,27 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let camera_path = arguments.camera.camera.as_deref();
     let camera = camera_path.map(|path| read_camera_json(path, resolve::default_near(&cloud))).transpose()?;
 
-    let ((), time) = progress.stage("prepare", |_| {
-        let areas = options.resolve != Resolve::Over;
-        let size_scale = arguments.splats.radius_scale;
-        prepare(
-            &mut cloud,
-            &PrepareOptions { kernel: options.kernel, cutoff: options.cutoff, areas, size_scale },
-        );
-    });
+    let up = resolve::up(&arguments.camera, &cloud);
+    let missing = PrepareOptions {
+        kernel: options.kernel,
+        cutoff: options.cutoff,
+        areas: options.resolve != Resolve::Over,
+        ..arguments.preparation.options(up)
+    };
+    let (estimated, time) = progress.stage("prepare", |update| prepare(&mut cloud, &missing, update));
     times.prepare = time;
+    if let Some(text) = preparation::in_words(&estimated, &missing) {
+        console.note(text);
+    }
     inputs::check_usable(&cloud, &reports)?;
     let (camera, mut options) = resolve::against_cloud(arguments, options, camera, &cloud)?;
-    let up = resolve::up(&arguments.camera, &cloud);
     options.material = material::material(&arguments.material, images, &cloud, up)?;
     options.check()?;
 
     let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
     let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
+    in_words += &arguments.preparation.describe();
     if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
         in_words += &format!(" --light {azimuth},{elevation}");
     }

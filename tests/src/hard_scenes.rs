@@ -229,6 +229,7 @@ pub fn adversarial(count: usize, seed: u64, camera: &Camera, known: Knowledge) -
         opacities: known.opacities.then(|| splats.iter().map(|splat| splat.opacity).collect()),
         areas: known.areas.then(|| areas.collect()),
         texture_coordinates: None,
+        outliers: None,
         shapes: if known.ellipses {
             Shapes::Ellipses(axes.iter().map(|axes| axes.map(|axis| axis.as_vec3())).collect())
         } else {

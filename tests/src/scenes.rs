@@ -70,6 +70,7 @@ pub fn permuted(cloud: &Cloud, order: &[usize]) -> Cloud {
         areas: cloud.areas.as_ref().map(|values| pick(values, order)),
         texture_coordinates: cloud.texture_coordinates.as_ref().map(|values| pick(values, order)),
         oriented: cloud.oriented,
+        outliers: cloud.outliers.as_ref().map(|values| pick(values, order)),
     }
 }
 

@@ -115,21 +115,46 @@ fn share_of_holes(name: &str, mut cloud: Cloud, mesh: &[[DVec3; 3]]) -> f64 {
     let given = cloud.normals.clone();
     if std::env::var_os("STRIP").is_some() {
         cloud.normals.clear();
-        let sizes = if env("KEEP", 0.0) > 0.0 { cloud.shapes.clone() } else { splat_core::Shapes::Discs(vec![0.0; cloud.len()]) };
+        let sizes = if env("KEEP", 0.0) > 0.0 {
+            cloud.shapes.clone()
+        } else {
+            splat_core::Shapes::Discs(vec![0.0; cloud.len()])
+        };
         cloud.shapes = sizes;
         cloud.oriented = false;
     }
-    let orientation = if env("GRAPH", 0.0) > 0.0 { splat_core::prepare::Orientation::Graph(DVec3::Y) } else { Default::default() };
-    prepare(&mut cloud, &PrepareOptions { normals_k: env("NK", 12.0) as usize, radius_k: env("RK", 8.0) as usize, size_scale: env("SCALE", 1.0), orientation, ..PrepareOptions::default() }, &mut |_| {});
+    let orientation = if env("GRAPH", 0.0) > 0.0 {
+        splat_core::prepare::Orientation::Graph(DVec3::Y)
+    } else {
+        Default::default()
+    };
+    prepare(
+        &mut cloud,
+        &PrepareOptions {
+            normals_k: env("NK", 12.0) as usize,
+            radius_k: env("RK", 8.0) as usize,
+            size_scale: env("SCALE", 1.0),
+            orientation,
+            ..PrepareOptions::default()
+        },
+        &mut |_| {},
+    );
     if !given.is_empty() {
-        let dots: Vec<f64> = given.iter().zip(&cloud.normals).map(|(a, b)| a.as_dvec3().dot(b.as_dvec3())).collect();
-        let rms = (dots.iter().map(|d| d.abs().min(1.0).acos().to_degrees().powi(2)).sum::<f64>() / dots.len() as f64).sqrt();
-        println!("normals rms {rms:.2} turned {:.4}", dots.iter().filter(|&&d| d < 0.0).count() as f64 / dots.len() as f64);
+        let dots: Vec<f64> =
+            given.iter().zip(&cloud.normals).map(|(a, b)| a.as_dvec3().dot(b.as_dvec3())).collect();
+        let rms = (dots.iter().map(|d| d.abs().min(1.0).acos().to_degrees().powi(2)).sum::<f64>()
+            / dots.len() as f64)
+            .sqrt();
+        println!(
+            "normals rms {rms:.2} turned {:.4}",
+            dots.iter().filter(|&&d| d < 0.0).count() as f64 / dots.len() as f64
+        );
     }
     let framing =
         Framing { width: 1280, height: 960, up: Up::Y, azimuth: 30.0, elevation: 20.0, orthographic: false };
     let camera = fit(&cloud, &framing, &options).unwrap();
-    let film = render(&cloud, &camera, &options, &mut |_| {}).unwrap().film;
+    let options = RenderOptions { samples: env("SPP", 16.0) as u32, ..options };
+    let film = splat_simd::Renderer::new(1, splat_simd::Level::choose()).unwrap().render(&cloud, &camera, &options, &mut |_| {}).unwrap().film;
     let inside = interior(&covered(mesh, &camera), 1280);
     let total = inside.iter().filter(|&&inside| inside).count();
     let open = inside.iter().zip(&film.rgba).filter(|(inside, rgba)| **inside && rgba[3] < 0.99).count();

@@ -3,6 +3,7 @@
 use crate::describe;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
+use splat_core::prepare::unknown_sizes;
 use splat_core::{Cloud, Shapes};
 use splat_io::{Import, ImportReport, Usage, read_ply};
 use std::collections::BTreeMap;
@@ -149,7 +150,7 @@ fn sizes(cloud: &Cloud) -> Sizes {
     let [low, high] = [f64::min, f64::max].map(|pick| known.iter().copied().reduce(pick));
     let mean = known.iter().sum::<f64>() / known.len() as f64;
     let range = low.zip(high).map(|(low, high)| [low, mean, high]);
-    Sizes { shape, known: known.len(), unknown: describe::unknown_sizes(cloud), range }
+    Sizes { shape, known: known.len(), unknown: unknown_sizes(cloud), range }
 }
 
 /// Least and greatest of the finite values.
