@@ -6,6 +6,7 @@ pub mod camera;
 pub mod cloud;
 pub mod error;
 pub mod evaluate;
+pub mod eye_dome;
 pub mod film;
 pub mod fit;
 pub mod kernel;

@@ -16,8 +16,9 @@ pub enum Orientation {
     Viewpoint(DVec3),
     /// Towards this direction in the world: up, for scans from the air.
     Direction(DVec3),
-    /// As their neighbours, along the tree of neighbours that turn least from one to the next (Hoppe et al. 1992). In each
-    /// connected part the point farthest in this direction of the world looks that way.
+    /// As their neighbours, along the tree of neighbours that turn least from one to the next (Hoppe et al. 1992). Of each
+    /// connected part the half that lies farther in this direction of the world looks that way in the mean, as the upper
+    /// half of every closed surface does (by the divergence theorem), and a terrain.
     Graph(DVec3),
 }
 
@@ -70,22 +71,40 @@ fn propagate(neighbors: &Neighbors, locals: &[Local], normals: &[Vec3], up: DVec
         let is_turned = normals[a as usize].dot(normals[b as usize]) < 0.0;
         sets.join(a as usize, b as usize, is_turned);
     }
-    // The place of each set that is farthest up.
-    let height = |place: usize| neighbors.place(place).dot(up);
-    let mut top: Vec<Option<usize>> = vec![None; normals.len()];
-    for place in 0..normals.len() {
-        let top = &mut top[sets.find(place).0];
-        if top.is_none_or(|top| height(place) > height(top)) {
-            *top = Some(place);
-        }
-    }
+    let faces_down = faces_down(neighbors, locals, normals, &sets, up);
     let turned = |place: usize| {
         let (set, turned) = sets.find(place);
-        let top = top[set].unwrap_or(place);
-        let top_faces_down = normals[top].as_dvec3().dot(up) < 0.0;
-        if turned != (sets.find(top).1 != top_faces_down) { -normals[place] } else { normals[place] }
+        if turned != faces_down[set] { -normals[place] } else { normals[place] }
     };
     (0..normals.len()).map(turned).collect()
+}
+
+/// For the first member of each set, whether its normal makes the upper half of the set look down.
+fn faces_down(
+    neighbors: &Neighbors,
+    locals: &[Local],
+    normals: &[Vec3],
+    sets: &TurnedSets,
+    up: DVec3,
+) -> Vec<bool> {
+    let height = |place: usize| neighbors.place(place).dot(up);
+    let mut heights = vec![(f64::INFINITY, f64::NEG_INFINITY); normals.len()];
+    for place in 0..normals.len() {
+        let (low, high) = &mut heights[sets.find(place).0];
+        (*low, *high) = (low.min(height(place)), high.max(height(place)));
+    }
+    // Summed by one task, in the order of places.
+    let mut upwards = vec![0.0; normals.len()];
+    for place in 0..normals.len() {
+        let (set, turned) = sets.find(place);
+        let (low, high) = heights[set];
+        if height(place) >= 0.5 * (low + high) {
+            let area = f64::from(locals[place].spacing) * f64::from(locals[place].spacing);
+            let sign = if turned { -1.0 } else { 1.0 };
+            upwards[set] += sign * area * normals[place].as_dvec3().dot(up);
+        }
+    }
+    upwards.into_iter().map(|sum| sum < 0.0).collect()
 }
 
 /// Disjoint sets of which each member knows whether it is turned against another.

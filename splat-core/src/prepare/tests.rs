@@ -138,3 +138,87 @@ fn measure_normals() {
         );
     }
 }
+
+/// The sum of weights at a place on the surface.
+fn weight(cloud: &Cloud, q: DVec3, options: &PrepareOptions) -> f64 {
+    let Shapes::Discs(sizes) = &cloud.shapes else { panic!("discs") };
+    let areas = cloud.areas.as_ref().unwrap();
+    let term = |i: usize| {
+        let size = f64::from(sizes[i]);
+        let offset = q - cloud.world_position(i);
+        let n = cloud.normals[i].as_dvec3();
+        let off = offset.dot(n);
+        if off.abs() > size {
+            return 0.0;
+        }
+        let r2 = (offset.length_squared() - off * off) / (size * size);
+        if r2 >= options.cutoff {
+            return 0.0;
+        }
+        f64::from(areas[i]) * options.kernel.value(r2, options.cutoff)
+            / (size * size * options.kernel.integral(options.cutoff))
+    };
+    (0..cloud.len()).map(term).sum()
+}
+
+#[test]
+fn measure_closing() {
+    let square = |n: &[f64]| DVec3::new(n[0], n[1], 0.0);
+    let numbers: Vec<f64> = random(8_000, 11).collect();
+    let poisson: Vec<DVec3> = numbers.chunks_exact(2).map(square).collect();
+    let jitter: Vec<DVec3> = numbers
+        .chunks_exact(2)
+        .enumerate()
+        .map(|(i, n)| DVec3::new(((i % 63) as f64 + n[0]) / 63.0, ((i / 63) as f64 + n[1]) / 63.0, 0.0))
+        .filter(|p| p.y <= 1.0)
+        .collect();
+    let lines = |ratio: f64| -> Vec<DVec3> {
+        let rows = (63.0 / ratio.sqrt()) as usize;
+        let columns = (63.0 * ratio.sqrt()) as usize;
+        (0..rows * columns)
+            .map(|i| {
+                let n = &numbers[2 * (i % 4000)..];
+                DVec3::new(
+                    ((i % columns) as f64 + 0.3 * n[0] + if (i / columns) % 2 == 0 { 0.5 } else { 0.0 })
+                        / columns as f64,
+                    ((i / columns) as f64 + 0.5 + 0.1 * n[1]) / rows as f64,
+                    0.0,
+                )
+            })
+            .collect()
+    };
+    let tests: Vec<DVec3> = random(4_000, 77).collect::<Vec<_>>().chunks_exact(2).map(square).collect();
+    for (name, points) in [
+        ("poisson", poisson),
+        ("jitter", jitter),
+        ("lines 3", lines(3.0)),
+        ("lines 5", lines(5.0)),
+        ("lines 10", lines(10.0)),
+    ] {
+        for k in [6, 8, 12, 16] {
+            let mut text = format!("{name} k {k}:");
+            for scale in [0.6, 0.7, 0.8, 1.0] {
+                let options = PrepareOptions { radius_k: k, size_scale: scale, ..PrepareOptions::default() };
+                let cloud = prepared(&points, &options);
+                let inside: Vec<f64> = tests
+                    .iter()
+                    .filter(|q| q.x > 0.1 && q.x < 0.9 && q.y > 0.1 && q.y < 0.9)
+                    .map(|&q| weight(&cloud, q, &options))
+                    .collect();
+                let open = inside.iter().filter(|&&w| w < 0.5).count() as f64 / inside.len() as f64;
+                // Beyond the left edge.
+                let out = (0..1000)
+                    .map(|i| {
+                        DVec3::new(-0.06 * f64::from(i % 20) / 20.0, 0.1 + 0.8 * f64::from(i) / 1000.0, 0.0)
+                    })
+                    .filter(|&q| weight(&cloud, q, &options) >= 0.5)
+                    .count() as f64
+                    / 1000.0
+                    * 0.06
+                    * 63.0;
+                text += &format!(" | {scale}: open {:.2} % bloat {out:.2}", 100.0 * open);
+            }
+            println!("{text}");
+        }
+    }
+}
