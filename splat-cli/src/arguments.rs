@@ -225,6 +225,9 @@ pub struct SplatArguments {
     /// How light falls on splats
     #[arg(long, value_name = "SHADING", default_value = "auto")]
     pub shading: ShadingChoice,
+    /// How much --shading edl darkens; 1 is usual [default: 1]
+    #[arg(long, value_name = "STRENGTH", value_parser = values::positive)]
+    pub edl_strength: Option<f64>,
     /// Where --shading lambert has its light: AZIMUTH,ELEVATION in degrees, as in --view [default: 45,45]
     #[arg(long, value_name = "DIRECTION", value_parser = values::view, allow_hyphen_values = true)]
     pub light: Option<ViewDirection>,

@@ -12,6 +12,7 @@ mod convert;
 mod demo;
 mod describe;
 mod engine;
+mod eye_dome;
 mod info;
 mod inputs;
 mod material;

@@ -1,14 +1,14 @@
 //! `splat render`: clouds in, a picture out.
 
 use crate::arguments::{OutputArguments, RenderArguments};
-use crate::choices::ExrTypeChoice;
+use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
 use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{describe, inputs, material, output, prepare as preparation, resolve};
+use crate::{describe, eye_dome, inputs, material, output, prepare as preparation, resolve};
 use splat_abuffer::Resolve;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -59,10 +59,19 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     options.material = material::material(&arguments.material, images, &cloud, up)?;
     options.check()?;
 
-    let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
+    let strength = arguments.splats.edl_strength.unwrap_or(1.0);
+    let rendered = if arguments.splats.shading == ShadingChoice::Edl {
+        eye_dome::render(&mut engine, &cloud, &camera, &options, strength, &progress, console)?
+    } else {
+        engine.render(&cloud, &camera, &options, &progress, console)?
+    };
     let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
     let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
     in_words += &arguments.preparation.describe();
+    if arguments.splats.shading == ShadingChoice::Edl {
+        // The last of two counts.
+        in_words += &format!(" --shading edl --edl-strength {strength}");
+    }
     if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
         in_words += &format!(" --light {azimuth},{elevation}");
     }

@@ -36,6 +36,19 @@ pub fn options(arguments: &RenderArguments) -> Result<RenderOptions, UsageError>
     if splats.light.is_some() && splats.shading != ShadingChoice::Lambert {
         return Err(UsageError::new("--light says nothing without --shading lambert"));
     }
+    if splats.edl_strength.is_some() && splats.shading != ShadingChoice::Edl {
+        return Err(UsageError::new("--edl-strength says nothing without --shading edl"));
+    }
+    if splats.shading == ShadingChoice::Edl {
+        if samples.samples.is_some() {
+            return Err(UsageError::new(
+                "--shading edl needs all samples: it cannot be joined from --samples A:B",
+            ));
+        }
+        if splats.resolve == ResolveChoice::Over {
+            return Err(UsageError::new("--shading edl is for surfaces: it does not go with --resolve over"));
+        }
+    }
     material::check(&arguments.material)?;
     let (kernel, cutoff) = match splats.resolve {
         ResolveChoice::Surface => (Kernel::Windowed, 4.0),

@@ -134,8 +134,9 @@ mod tests {
     #[test]
     fn planes_of_any_slope_stay_as_they_are() {
         for slope in [0.0, 0.3, -2.0] {
-            let perspective =
-                shaded(&camera(true, 1.0), WHOLE, |x, y| 1.0 / (1.0 + 0.01 * slope * (f64::from(x) - 0.5 * f64::from(y))));
+            let perspective = shaded(&camera(true, 1.0), WHOLE, |x, y| {
+                1.0 / (1.0 + 0.01 * slope * (f64::from(x) - 0.5 * f64::from(y)))
+            });
             let orthographic =
                 shaded(&camera(false, 1.0), WHOLE, |x, y| 5.0 + 0.1 * slope * f64::from(x + y));
             // The depths' rounding to f32 is some 1e-5 pixels.

@@ -2,7 +2,7 @@
 
 use super::neighbors::Neighbors;
 use super::normal::least_spread;
-use super::size::spacing;
+use super::{PrepareOptions, cell};
 use glam::{DVec3, Vec3};
 
 /// Neighbours that are kept.
@@ -11,13 +11,19 @@ const KEPT: usize = 8;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
+/// Sigma of a splat in a cloud that tells nothing about spacing.
+const LONE_SIZE: f64 = 1.0;
+
+/// How much larger than those around it a splat may be.
+const CAP: f32 = 2.0;
+
 /// The neighbourhood of a place.
 #[derive(Debug, Clone, Copy)]
 pub struct Local {
-    /// Unit normal; its sign says nothing.
+    /// Unit normal: as given, else estimated, and then its sign says nothing.
     pub normal: Vec3,
-    /// Distance between points, in scene units; 0 where there is one place only.
-    pub spacing: f32,
+    /// Sigma-scaled axes of the splat.
+    pub axes: [Vec3; 2],
     nearest: [u32; KEPT],
 }
 
@@ -26,28 +32,53 @@ impl Local {
     pub fn nearest(&self) -> impl Iterator<Item = usize> {
         self.nearest.iter().filter(|&&other| other != NONE).map(|&other| other as usize)
     }
+
+    /// Sigma of the round splat of the same area.
+    pub fn size(&self) -> f32 {
+        (self.axes[0].length() * self.axes[1].length()).sqrt()
+    }
 }
 
-/// The neighbourhood of every place: normals from `normals_k` nearest neighbours (none if 0), spacings from `radius_k`.
+/// The neighbourhood of every place; `normals` are those of the cloud, empty if they are to be estimated.
 pub fn explore(
     neighbors: &Neighbors,
-    normals_k: usize,
-    radius_k: usize,
+    normals: &[Vec3],
+    options: &PrepareOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Vec<Local> {
-    let count = normals_k.max(radius_k).max(KEPT);
+    let PrepareOptions { normals_k, radius_k, .. } = *options;
     neighbors.map(progress, |place| {
-        let found = neighbors.nearest(place, count);
+        let found = neighbors.nearest(place, normals_k.max(radius_k).max(KEPT));
         let mut nearest = [NONE; KEPT];
-        for (kept, &(other, _)) in nearest.iter_mut().zip(&found) {
+        for (kept, &other) in nearest.iter_mut().zip(&found) {
             *kept = other as u32;
         }
-        let reached = radius_k.min(found.len());
-        let spacing = if reached == 0 { 0.0 } else { spacing(found[reached - 1].1, reached) as f32 };
         let centre = neighbors.place(place);
-        let close = &found[..normals_k.min(found.len())];
-        let offsets: Vec<DVec3> = close.iter().map(|&(other, _)| neighbors.place(other) - centre).collect();
-        let normal = if normals_k == 0 { Vec3::ZERO } else { least_spread(&offsets).as_vec3() };
-        Local { normal, spacing, nearest }
+        let offsets: Vec<DVec3> = found.iter().map(|&other| neighbors.place(other) - centre).collect();
+        let first = |count: usize| &offsets[..count.min(offsets.len())];
+        let given = neighbors.members(place).next().and_then(|index| normals.get(index));
+        let normal = given.copied().unwrap_or_else(|| least_spread(first(normals_k)).as_vec3());
+        // A normal that is zero or not finite belongs to a splat that is never drawn.
+        let plane = normal.as_dvec3().try_normalize().unwrap_or(DVec3::Z);
+        let lone = || <[DVec3; 2]>::from(plane.any_orthonormal_pair()).map(|axis| LONE_SIZE * axis);
+        let axes = cell::axes(plane, first(radius_k)).unwrap_or_else(lone).map(|axis| axis.as_vec3());
+        Local { normal, axes, nearest }
     })
+}
+
+/// Makes each splat that is more than twice as large as the median of its nearest ones as small as that: a point far from all
+/// others is no giant.
+pub fn cap_sizes(neighbors: &Neighbors, locals: &mut [Local]) {
+    let factors = neighbors.map(&mut |_| {}, |place| {
+        let mut others: Vec<f32> = locals[place].nearest().map(|other| locals[other].size()).collect();
+        if others.is_empty() {
+            return 1.0;
+        }
+        let middle = others.len() / 2;
+        let (_, median, _) = others.select_nth_unstable_by(middle, f32::total_cmp);
+        (CAP * *median / locals[place].size()).min(1.0)
+    });
+    for (local, factor) in locals.iter_mut().zip(factors) {
+        local.axes = local.axes.map(|axis| axis * factor);
+    }
 }

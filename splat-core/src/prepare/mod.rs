@@ -3,12 +3,12 @@
 //! Every estimate depends on the set of points only, not on their order.
 
 mod area;
+mod cell;
 mod local;
 mod neighbors;
 mod normal;
 mod orientation;
 mod outlier;
-mod size;
 #[cfg(test)]
 mod tests;
 
@@ -16,7 +16,8 @@ pub use orientation::Orientation;
 pub use outlier::Outliers;
 
 use crate::{Cloud, Kernel, Shapes};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use local::Local;
 use neighbors::Neighbors;
 
 /// What the estimates depend on. The default is what `surface` wants.
@@ -48,10 +49,10 @@ impl Default for PrepareOptions {
             kernel: Kernel::Windowed,
             cutoff: 4.0,
             areas: true,
-            normals_k: 12,
+            normals_k: 16,
             orientation: Orientation::default(),
             radius: None,
-            radius_k: 8,
+            radius_k: 16,
             size_scale: 1.0,
             outliers: Outliers::default(),
         }
@@ -121,8 +122,7 @@ fn complete(
     wanted: &Estimated,
     progress: &mut dyn FnMut(f64),
 ) {
-    let normals_k = if wanted.normals { options.normals_k } else { 0 };
-    let locals = local::explore(neighbors, normals_k, options.radius_k, progress);
+    let mut locals = local::explore(neighbors, &cloud.normals, options, progress);
     if wanted.normals {
         cloud.normals = vec![Vec3::ZERO; cloud.len()];
         for (place, local) in locals.iter().enumerate() {
@@ -133,13 +133,27 @@ fn complete(
     if wanted.sides {
         orientation::orient(cloud, neighbors, &locals, options.orientation);
     }
-    if let (Shapes::Discs(sizes), true) = (&mut cloud.shapes, wanted.sizes > 0) {
-        for (place, size) in size::estimate(neighbors, &locals).into_iter().enumerate() {
-            for index in neighbors.members(place) {
-                if sizes[index] == 0.0 {
-                    sizes[index] = size;
-                }
-            }
+    if wanted.sizes > 0 {
+        local::cap_sizes(neighbors, &mut locals);
+        fill_sizes(cloud, neighbors, &locals, wanted.sizes == cloud.len());
+    }
+}
+
+/// Gives splats of unknown size their axes, or, where the sizes of others are known, the size of the same area.
+fn fill_sizes(cloud: &mut Cloud, neighbors: &Neighbors, locals: &[Local], all_unknown: bool) {
+    let places = locals.iter().enumerate();
+    let splats = places.flat_map(|(place, local)| neighbors.members(place).map(move |index| (index, local)));
+    if all_unknown {
+        let mut axes = vec![[Vec3::ZERO; 2]; cloud.len()];
+        splats.for_each(|(index, local)| axes[index] = local.axes);
+        cloud.shapes = Shapes::Ellipses(axes);
+        // The derivatives of round splats mean nothing.
+        for coordinates in cloud.texture_coordinates.iter_mut().flatten() {
+            (coordinates.per_u, coordinates.per_v) = (Vec2::ZERO, Vec2::ZERO);
+        }
+    } else if let Shapes::Discs(sizes) = &mut cloud.shapes {
+        for (index, local) in splats.filter(|&(index, _)| sizes[index] == 0.0).collect::<Vec<_>>() {
+            sizes[index] = local.size();
         }
     }
 }

@@ -60,15 +60,20 @@ impl Neighbors {
         self.members[range].iter().map(|&index| index as usize)
     }
 
-    /// The `count` nearest other places, the nearest first, each with its distance; fewer if there are fewer.
-    pub fn nearest(&self, place: usize, count: usize) -> Vec<(usize, f64)> {
+    /// Distance between two places.
+    pub fn distance(&self, a: usize, b: usize) -> f64 {
+        self.place(a).distance(self.place(b))
+    }
+
+    /// The `count` nearest other places, the nearest first; fewer if there are fewer.
+    pub fn nearest(&self, place: usize, count: usize) -> Vec<usize> {
         let (Some(tree), Some(wanted)) = (&self.tree, NonZero::new(count.saturating_add(1).min(self.len())))
         else {
             return Vec::new();
         };
         let found = tree.query(&self.places[place]).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
-        let others = found.into_iter().map(|found| (found.item as usize, found.distance.sqrt()));
-        others.filter(|&(other, _)| other != place).take(count).collect()
+        let others = found.into_iter().map(|found| found.item as usize);
+        others.filter(|&other| other != place).take(count).collect()
     }
 
     /// The places within `radius` of a place, itself among them, in no useful order.
@@ -163,7 +168,9 @@ mod tests {
         members.sort();
         assert_eq!(members, [vec![0, 1, 2, 3, 4], vec![5, 8], vec![7]]);
         let origin = (0..3).find(|&place| neighbors.place(place) == DVec3::ZERO).unwrap();
-        assert_eq!(neighbors.nearest(origin, 9).iter().map(|found| found.1).collect::<Vec<_>>(), [1.0, 1.0]);
+        let distances: Vec<f64> =
+            neighbors.nearest(origin, 9).into_iter().map(|other| neighbors.distance(origin, other)).collect();
+        assert_eq!(distances, [1.0, 1.0]);
         assert_eq!(neighbors.within(origin, 0.5).collect::<Vec<_>>(), [origin]);
     }
 }

@@ -99,7 +99,7 @@ fn faces_down(
         let (set, turned) = sets.find(place);
         let (low, high) = heights[set];
         if height(place) >= 0.5 * (low + high) {
-            let area = f64::from(locals[place].spacing) * f64::from(locals[place].spacing);
+            let area = f64::from(locals[place].size() * locals[place].size());
             let sign = if turned { -1.0 } else { 1.0 };
             upwards[set] += sign * area * normals[place].as_dvec3().dot(up);
         }

@@ -37,7 +37,8 @@ pub fn mark(cloud: &mut Cloud, outliers: Outliers, progress: &mut dyn FnMut(f64)
         Outliers::Statistical { neighbors: count, sigmas } => far_ones(&neighbors, count, sigmas, progress),
         Outliers::Radius { radius, count } => neighbors.map(progress, |place| {
             let found = neighbors.nearest(place, count);
-            found.len() < count || found.last().is_some_and(|&(_, distance)| distance > radius)
+            found.len() < count
+                || found.last().is_some_and(|&other| neighbors.distance(place, other) > radius)
         }),
     };
     let mut marks = vec![false; cloud.len()];
@@ -52,7 +53,7 @@ pub fn mark(cloud: &mut Cloud, outliers: Outliers, progress: &mut dyn FnMut(f64)
 fn far_ones(neighbors: &Neighbors, count: usize, sigmas: f64, progress: &mut dyn FnMut(f64)) -> Vec<bool> {
     let distances = neighbors.map(progress, |place| {
         let found = neighbors.nearest(place, count);
-        found.iter().map(|&(_, distance)| distance).sum::<f64>() / found.len().max(1) as f64
+        found.iter().map(|&other| neighbors.distance(place, other)).sum::<f64>() / found.len().max(1) as f64
     });
     // Summed by one task, in the order of places.
     let number = distances.len().max(1) as f64;
