@@ -69,8 +69,9 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let mut in_words = describe::options(&options) + &material::describe(&arguments.material);
     in_words += &arguments.preparation.describe();
     if arguments.splats.shading == ShadingChoice::Edl {
-        // The last of two counts.
-        in_words += &format!(" --shading edl --edl-strength {strength}");
+        for lit in ["--shading color", "--shading headlight"] {
+            in_words = in_words.replace(lit, &format!("--shading edl --edl-strength {strength}"));
+        }
     }
     if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
         in_words += &format!(" --light {azimuth},{elevation}");
