@@ -89,7 +89,7 @@ impl Subject {
         let Some(folder) = std::env::var_os(DATA).map(PathBuf::from) else { return Ok(None) };
         let mut cloud = splat_io::read_ply(&folder.join(file)).context("a real file")?.cloud;
         let RenderOptions { kernel, cutoff, .. } = RenderOptions::default();
-        prepare(&mut cloud, &PrepareOptions { kernel, cutoff, areas: true, size_scale: 1.0 });
+        prepare(&mut cloud, &PrepareOptions { kernel, cutoff, ..PrepareOptions::default() }, &mut |_| {});
         Ok(Some(cloud))
     }
 

@@ -28,8 +28,8 @@ pub fn sphere(count: usize) -> Cloud {
     cloud.normals = points.iter().map(|point| point.as_vec3()).collect();
     cloud.shapes = Shapes::Discs(vec![(1.5 * spacing) as f32; count]);
     cloud.oriented = true;
-    let options = PrepareOptions { kernel: Kernel::Gaussian, cutoff: 2.0, areas: true, size_scale: 1.0 };
-    prepare(&mut cloud, &options);
+    let options = PrepareOptions { kernel: Kernel::Gaussian, cutoff: 2.0, ..PrepareOptions::default() };
+    prepare(&mut cloud, &options, &mut |_| {});
     cloud
 }
 

@@ -8,6 +8,7 @@ use crate::choices::{
 use crate::console::Console;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
+use crate::prepare::{PreparationArguments, PrepareArguments};
 use crate::scene::Scene;
 use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
@@ -36,6 +37,10 @@ pub enum Command {
     /// coordinates. Clouds are written as they are, several as one; what they lack is estimated by render, and what the format
     /// has no place for is named.
     Convert(ConvertArguments),
+    /// Make a cloud complete (.ply): normals, sizes, areas, stray points
+    ///
+    /// Rendering the result gives the picture of the original, without estimating again.
+    Prepare(PrepareArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
     /// Render a scene made in code, which shows what the program does
@@ -78,6 +83,14 @@ pub struct ReadArguments {
     /// Only points of these classes, as 2,6 or, all but these, !7,18
     #[arg(long, value_name = "LIST", value_parser = values::classes)]
     pub classes: Option<Classes>,
+}
+
+impl ReadArguments {
+    /// Takes from others what these leave open.
+    pub fn fill_in(&mut self, others: &Self) {
+        self.columns = self.columns.take().or_else(|| others.columns.clone());
+        self.classes = self.classes.take().or_else(|| others.classes.clone());
+    }
 }
 
 /// Surfels on a mesh: one spacing is then below two pixels where the surface fills a picture of the default size.
@@ -148,6 +161,9 @@ pub struct RenderArguments {
     /// What the splats look like.
     #[command(flatten, next_help_heading = "Splats")]
     pub splats: SplatArguments,
+    /// What is estimated, and how.
+    #[command(flatten, next_help_heading = "Preparation")]
+    pub preparation: PreparationArguments,
     /// Textures and surroundings.
     #[command(flatten, next_help_heading = "Texture")]
     pub material: MaterialArguments,
@@ -255,9 +271,28 @@ pub struct SplatArguments {
     /// Draw the fronts of splats only
     #[arg(long)]
     pub cull: bool,
-    /// Factor on all sizes, given and estimated
-    #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
-    pub radius_scale: f64,
+    /// What is shown as colour.
+    #[command(flatten)]
+    pub colors: ColorArguments,
+    /// How light falls on splats
+    #[arg(long, value_name = "SHADING", default_value = "auto", help_heading = "Light")]
+    pub shading: ShadingChoice,
+    /// How much --shading edl darkens; 1 is usual [default: 1]
+    #[arg(long, value_name = "STRENGTH", value_parser = values::positive, help_heading = "Light")]
+    pub edl_strength: Option<f64>,
+    /// Where --shading lambert has its light: AZIMUTH,ELEVATION in degrees, as in --view [default: 45,45]
+    #[arg(long, value_name = "DIRECTION", value_parser = values::view, allow_hyphen_values = true)]
+    #[arg(help_heading = "Light")]
+    pub light: Option<ViewDirection>,
+    /// Linear R,G,B or R,G,B,A behind everything, or none
+    #[arg(long, value_name = "COLOR", value_parser = values::background, default_value = "none")]
+    #[arg(allow_hyphen_values = true, help_heading = "Film")]
+    pub background: Background,
+}
+
+/// What is shown as colour.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ColorArguments {
     /// What is shown as colour: rgb, intensity, height, normal, class, or the name of a scalar field
     /// [default: rgb; where there is none, the intensity]
     #[arg(long, value_name = "WHAT", value_parser = values::color)]
@@ -268,17 +303,27 @@ pub struct SplatArguments {
     /// The numbers at both ends of the colours [default: 2 % of the points lie below, and 2 % above]
     #[arg(long, value_name = "LO:HI", value_parser = values::color_range, allow_hyphen_values = true)]
     pub color_range: Option<[f64; 2]>,
-    /// How light falls on splats
-    #[arg(long, value_name = "SHADING", default_value = "auto", help_heading = "Light")]
-    pub shading: ShadingChoice,
-    /// Where --shading lambert has its light: AZIMUTH,ELEVATION in degrees, as in --view [default: 45,45]
-    #[arg(long, value_name = "DIRECTION", value_parser = values::view, allow_hyphen_values = true)]
-    #[arg(help_heading = "Light")]
-    pub light: Option<ViewDirection>,
-    /// Linear R,G,B or R,G,B,A behind everything, or none
-    #[arg(long, value_name = "COLOR", value_parser = values::background, default_value = "none")]
-    #[arg(allow_hyphen_values = true, help_heading = "Film")]
-    pub background: Background,
+}
+
+/// What a scene file may say of one of its clouds, besides where it is.
+#[derive(Debug, Clone, Parser)]
+#[command(no_binary_name = true)]
+pub struct CloudArguments {
+    /// How the file is read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
+    /// What is shown as its colour.
+    #[command(flatten)]
+    pub colors: ColorArguments,
+    /// What it is made of.
+    #[command(flatten)]
+    pub material: MaterialArguments,
+    /// Factor on its sizes, besides that of all clouds
+    #[arg(long, value_parser = values::positive, default_value_t = 1.0)]
+    pub radius_scale: f64,
+    /// Factor on its opacities, 0 to 1
+    #[arg(long, value_parser = values::share, default_value_t = 1.0)]
+    pub opacity: f64,
 }
 
 /// Textures and surroundings.

@@ -155,14 +155,16 @@ pub enum ShadingChoice {
     Headlight,
     /// Lit from far away: see --light
     Lambert,
+    /// As auto without edl, darkened in creases and behind edges by the depths of the picture: see --edl-strength
+    Edl,
 }
 
 impl ShadingChoice {
     /// The shading of a cloud, given whether it has colours and where a distant light is.
     pub fn shading(self, has_colors: bool, to_light: DVec3) -> Shading {
         match self {
-            Self::Auto if has_colors => Shading::Color,
-            Self::Auto | Self::Headlight => Shading::Headlight,
+            Self::Auto | Self::Edl if has_colors => Shading::Color,
+            Self::Auto | Self::Edl | Self::Headlight => Shading::Headlight,
             Self::Color => Shading::Color,
             Self::Lambert => Shading::Lambert { to_light },
         }
@@ -384,7 +386,7 @@ mod tests {
         assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8", "poly8"]);
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);
         assert_eq!(words::<CoverageChoice>(), ["opaque", "soft"]);
-        assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight", "lambert"]);
+        assert_eq!(words::<ShadingChoice>(), ["auto", "color", "headlight", "lambert", "edl"]);
         assert_eq!(words::<ColorMapChoice>(), ["viridis", "cividis", "inferno", "gray"]);
         assert_eq!(words::<MappingChoice>(), ["uv", "spherical", "cylindrical", "planar"]);
         assert_eq!(words::<WrapChoice>(), ["repeat", "clamp", "mirror", "black"]);

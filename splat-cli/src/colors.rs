@@ -1,6 +1,6 @@
 //! Colours from what was measured: `--color`.
 
-use crate::arguments::SplatArguments;
+use crate::arguments::ColorArguments;
 use crate::choices::ColorMapChoice;
 use crate::console::Console;
 use crate::values::ColorChoice;
@@ -23,9 +23,9 @@ const UNKNOWN: Vec3 = Vec3::new(0.5, 0.0, 0.5);
 ///
 /// # Errors
 /// A sentence that names what the cloud lacks.
-pub fn choose(cloud: &Cloud, arguments: &SplatArguments) -> anyhow::Result<Option<ColorChoice>> {
+pub fn choose(cloud: &Cloud, arguments: &ColorArguments) -> anyhow::Result<Option<ColorChoice>> {
     match &arguments.color {
-        Some(ColorChoice::Rgb) => ensure!(cloud.colors.is_some(), "--color rgb: the cloud has no colours"),
+        Some(ColorChoice::Rgb) => ensure!(has_colors(cloud), "--color rgb: the cloud has no colours"),
         Some(ColorChoice::Class) => {
             ensure!(cloud.field(CLASS).is_some(), "--color class: the points have no class");
         }
@@ -46,10 +46,13 @@ pub fn choose(cloud: &Cloud, arguments: &SplatArguments) -> anyhow::Result<Optio
 pub fn apply(
     cloud: &mut Cloud,
     choice: ColorChoice,
-    arguments: &SplatArguments,
+    arguments: &ColorArguments,
     up: Up,
     console: Console,
 ) -> anyhow::Result<String> {
+    if choice != ColorChoice::Rgb {
+        cloud.harmonics = None;
+    }
     let (values, what) = match choice {
         ColorChoice::Rgb => return Ok(String::new()),
         ColorChoice::Normal => {
@@ -101,11 +104,16 @@ pub fn apply(
 /// What is shown of a cloud where no option says: its colours, or else its intensity, if that differs from point to point;
 /// `None` for neither.
 pub fn default_choice(cloud: &Cloud) -> Option<ColorChoice> {
-    if cloud.colors.is_some() {
+    if has_colors(cloud) {
         return Some(ColorChoice::Rgb);
     }
     let [low, high] = robust_range(&cloud.field("intensity")?.values)?;
     (low < high).then(|| ColorChoice::Field("intensity".to_owned()))
+}
+
+/// Whether a cloud has colours of its own.
+fn has_colors(cloud: &Cloud) -> bool {
+    cloud.colors.is_some() || cloud.harmonics.is_some()
 }
 
 /// The numbers between which all but a share of the points lies at each end, those that are not finite left out; the

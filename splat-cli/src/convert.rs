@@ -11,8 +11,9 @@ use splat_io::{CloudTarget, PlyEncoding, write_cloud};
 use std::time::Instant;
 
 /// What a `.splat` file needs of a cloud: normals and sizes.
-const FOR_SPLATS: PrepareOptions =
-    PrepareOptions { kernel: Kernel::Gaussian, cutoff: 9.0, areas: false, size_scale: 1.0 };
+fn for_splats() -> PrepareOptions {
+    PrepareOptions { kernel: Kernel::Gaussian, cutoff: 9.0, areas: false, ..PrepareOptions::default() }
+}
 
 /// Runs the command.
 ///
@@ -40,7 +41,7 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
         }
     }
     if target == CloudTarget::Splat {
-        progress.stage("prepare", |_| prepare(&mut cloud, &FOR_SPLATS));
+        progress.stage("prepare", |update| prepare(&mut cloud, &for_splats(), update));
     }
     let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
     let (written, _) = progress.stage("write", |_| write_cloud(path, &cloud, target, encoding));

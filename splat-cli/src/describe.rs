@@ -5,7 +5,8 @@ use crate::resolve::assumed_up;
 use crate::values::ColorChoice;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::fit::Up;
-use splat_core::{Cloud, Kernel, PatternKind, PixelFilter, RenderOptions, Shading, Shapes, TableMode};
+use splat_core::prepare::unknown_sizes;
+use splat_core::{Cloud, Kernel, PatternKind, PixelFilter, RenderOptions, Shading, TableMode};
 use std::fmt::Write;
 
 /// The options that tell one picture from another, as the command line has them; samples and seed have
@@ -84,8 +85,10 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
         return assumptions;
     }
     if cloud.normals.is_empty() {
-        assumptions
-            .push("normals are estimated from neighbours; both sides of a splat look alike".to_owned());
+        assumptions.push(
+            "normals are estimated from neighbours; both sides of a splat look alike (--orient, --viewpoint)"
+                .to_owned(),
+        );
     }
     if let unknown @ 1.. = unknown_sizes(cloud) {
         assumptions.push(format!("{unknown} sizes are estimated from the spacing of the points"));
@@ -104,14 +107,6 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
         None => Some("there is no colour: a headlight shades the surfaces (--shading)".to_owned()),
     });
     assumptions
-}
-
-/// The number of splats whose size is unknown.
-pub fn unknown_sizes(cloud: &Cloud) -> usize {
-    match &cloud.shapes {
-        Shapes::Discs(sizes) => sizes.iter().filter(|&&size| size == 0.0).count(),
-        Shapes::Ellipses(_) => 0,
-    }
 }
 
 /// Causes and their counts: "3 not_finite, 1 zero_normal".

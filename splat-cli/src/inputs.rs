@@ -60,18 +60,29 @@ pub fn read(
         read_one(path, reading, &mut |done| progress((index as f64 + done) / paths.len() as f64))
     };
     let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
-    let (clouds, reports): (Vec<Cloud>, Vec<ImportReport>) =
-        imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
-    let mut cloud = Cloud::join(clouds)?;
+    let (clouds, reports) = imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    Ok((Cloud::join(clouds)?, reports))
+}
+
+/// Reads a cloud, or a mesh as a cloud, and picks the classes that are wanted.
+///
+/// # Errors
+/// What the reader says; a mesh without an area; a cloud without classes.
+pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
+    let mut import = read_all(path, reading, progress)?;
     if let Some(classes) = &reading.classes {
         // Class 0 is what was never classified.
-        let field = cloud.field("classification");
-        ensure!(field.is_some() || classes.has(0.0), "--classes: the points have no classification");
+        let field = import.cloud.field("classification");
+        ensure!(
+            field.is_some() || classes.has(0.0),
+            "{}: --classes: the points have no classification",
+            path.display()
+        );
         let class = |index: usize| field.map_or(0.0, |field| field.values[index]);
-        let kept: Vec<usize> = (0..cloud.len()).filter(|&index| classes.has(class(index))).collect();
-        cloud = cloud.only(&kept);
+        let kept: Vec<usize> = (0..import.cloud.len()).filter(|&index| classes.has(class(index))).collect();
+        import.cloud = import.cloud.only(&kept);
     }
-    Ok((cloud, reports))
+    Ok(import)
 }
 
 /// Whether a file is an OBJ mesh, by its name.
@@ -80,7 +91,7 @@ pub fn is_obj(path: &Path) -> bool {
 }
 
 /// Reads a cloud, or a mesh as a cloud.
-fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
+fn read_all(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     if is_obj(path) {
         sampled(read_obj(path)?, reading.sampling, progress)
     } else if reading.with_faces && cloud_format(path)? == CloudFormat::Ply && ply_has_faces(path)? {

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod assemble;
 mod cameras;
 mod choices;
 mod colors;
@@ -14,6 +15,7 @@ mod convert;
 mod demo;
 mod describe;
 mod engine;
+mod eye_dome;
 mod frames;
 mod info;
 mod inputs;
@@ -21,6 +23,7 @@ mod interrupt;
 mod map;
 mod material;
 mod output;
+mod prepare;
 mod progress;
 mod render;
 mod resolve;
@@ -57,6 +60,7 @@ fn run() -> anyhow::Result<()> {
         Command::Render(arguments) if arguments.print_config => scene::print(&arguments, &matches),
         Command::Render(arguments) => render::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::Prepare(arguments) => prepare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
     }

@@ -47,7 +47,7 @@ pub fn check(arguments: &MaterialArguments) -> Result<(), UsageError> {
 }
 
 /// The images of a material.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Images {
     texture: Option<Arc<Pyramid>>,
     environment: Option<Arc<Pyramid>>,

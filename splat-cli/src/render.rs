@@ -1,17 +1,15 @@
 //! `splat render`: clouds in, a picture out.
 
 use crate::arguments::{OutputArguments, RenderArguments};
+use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
-use crate::choices::ExrTypeChoice;
+use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
-use crate::inputs::{Reading, Sampling};
 use crate::progress::Progress;
 use crate::statistics::{self, Report, Times, is_stdout};
 use crate::values::ViewDirection;
-use crate::{colors, describe, frames, inputs, map, material, output, resolve};
-use splat_abuffer::Resolve;
-use splat_core::prepare::{PrepareOptions, prepare};
+use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
 use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, write_picture};
 use std::path::{Path, PathBuf};
@@ -31,32 +29,12 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         output::check_file(path)?;
     }
 
+    preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
-    let images = material::read(&arguments.material, console)?;
-    let reading = Reading::new(Sampling::default(), false, &arguments.reading);
-    let (input, time) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
-    times.read = time;
-    let (mut cloud, reports) = input?;
-    let options = resolve::options(arguments, cloud.trained)?;
-    note_assumptions(console, &cloud, &reports);
-    let color = colors::choose(&cloud, &arguments.splats)?;
+    let Assembled { cloud, reports, materials, color, options, .. } =
+        assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
-
-    let ((), time) = progress.stage("prepare", |_| {
-        let areas = options.resolve != Resolve::Over;
-        let size_scale = arguments.splats.radius_scale;
-        prepare(
-            &mut cloud,
-            &PrepareOptions { kernel: options.kernel, cutoff: options.cutoff, areas, size_scale },
-        );
-    });
-    times.prepare = time;
-    inputs::check_usable(&cloud, &reports)?;
-    let up = resolve::up(&arguments.camera, &cloud);
-    let color = color.map(|choice| colors::apply(&mut cloud, choice, &arguments.splats, up, console));
-    let color = color.transpose()?.unwrap_or_default();
-    let material = material::material(&arguments.material, images, &cloud, up)?;
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
     let fitted = is_fitted.then(|| Fitted::new(arguments, &cloud, &options)).transpose()?;
 
@@ -66,7 +44,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         let camera = shot.camera.or_else(|| Some(fitted.as_ref()?.camera(shot.index)));
         let camera = camera.expect("a shot has a camera, or there is a fitted one");
         let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
-        let options = RenderOptions { material: material.clone().into(), ..options };
+        let options = RenderOptions { material: materials.clone(), ..options };
         options.check()?;
         let picture = Picture {
             arguments,
@@ -109,9 +87,21 @@ impl Picture<'_> {
     ) -> anyhow::Result<Report> {
         let Self { arguments, cloud, reports, color, camera, options, path } = self;
         let console = arguments.talk.console();
-        let rendered = engine.render(cloud, &camera, &options, progress, console)?;
+        let strength = arguments.splats.edl_strength.unwrap_or(1.0);
+        let is_edl = arguments.splats.shading == ShadingChoice::Edl;
+        let rendered = if is_edl {
+            eye_dome::render(engine, cloud, &camera, &options, strength, progress, console)?
+        } else {
+            engine.render(cloud, &camera, &options, progress, console)?
+        };
         let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
         let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;
+        in_words += &arguments.preparation.describe();
+        if is_edl {
+            for lit in ["--shading color", "--shading headlight"] {
+                in_words = in_words.replace(lit, &format!("--shading edl --edl-strength {strength}"));
+            }
+        }
         if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
             in_words += &format!(" --light {azimuth},{elevation}");
         }
@@ -135,18 +125,6 @@ impl Picture<'_> {
             console.summary(print);
         }
         Ok(Report::new(read, &rendered.statistics, *times, engine))
-    }
-}
-
-/// Says what was assumed of files and cloud, if anyone wants to know.
-fn note_assumptions(console: Console, cloud: &Cloud, reports: &[ImportReport]) {
-    for report in reports {
-        for assumption in &report.assumptions {
-            console.note(format_args!("{}: {assumption}", report.path.display()));
-        }
-    }
-    for assumption in describe::assumptions(cloud) {
-        console.note(assumption);
     }
 }
 

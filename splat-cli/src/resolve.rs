@@ -40,6 +40,19 @@ pub fn options(arguments: &RenderArguments, trained: bool) -> Result<RenderOptio
     if splats.light.is_some() && splats.shading != ShadingChoice::Lambert {
         return Err(UsageError::new("--light says nothing without --shading lambert"));
     }
+    if splats.edl_strength.is_some() && splats.shading != ShadingChoice::Edl {
+        return Err(UsageError::new("--edl-strength says nothing without --shading edl"));
+    }
+    if splats.shading == ShadingChoice::Edl {
+        if samples.samples.is_some() {
+            return Err(UsageError::new(
+                "--shading edl needs all samples: it cannot be joined from --samples A:B",
+            ));
+        }
+        if resolve_choice(splats, trained) == ResolveChoice::Over {
+            return Err(UsageError::new("--shading edl is for surfaces: it does not go with --resolve over"));
+        }
+    }
     material::check(&arguments.material)?;
     let resolve = resolve_choice(splats, trained);
     let (kernel, cutoff) = match resolve {
@@ -232,12 +245,8 @@ mod tests {
         let mut cloud = Cloud::from_points(&points);
         splat_core::prepare::prepare(
             &mut cloud,
-            &splat_core::prepare::PrepareOptions {
-                kernel: Kernel::Windowed,
-                cutoff: 4.0,
-                areas: true,
-                size_scale: 1.0,
-            },
+            &splat_core::prepare::PrepareOptions::default(),
+            &mut |_| {},
         );
         cloud
     }

@@ -1,5 +1,7 @@
 //! The syntax of options that are no plain word: what each text means, and what is said about a wrong one.
 
+use glam::DVec3;
+use splat_core::prepare::Outliers;
 use splat_core::{AovSelection, PixelRect};
 use splat_io::mesh::MOST_SURFELS;
 use std::fmt::Display;
@@ -21,6 +23,11 @@ fn number(text: &str, expected: impl Display, accepted: impl Fn(f64) -> bool) ->
 /// A finite number greater than 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text, "a finite number greater than 0", |value| value.is_finite() && value > 0.0)
+}
+
+/// A share of the whole.
+pub fn share(text: &str) -> Result<f64, String> {
+    number(text, "a number from 0 to 1", |value| (0.0..=1.0).contains(&value))
 }
 
 /// `--columns`: what the columns of a text are, in their order.
@@ -94,6 +101,39 @@ pub fn color_range(text: &str) -> Result<[f64; 2], String> {
     let ends = split(text, ':').filter(|ends: &[f64; 2]| ends.iter().all(|end| end.is_finite()));
     ends.filter(|[low, high]| low < high)
         .ok_or_else(|| "expected LO:HI, finite numbers with LO < HI".to_owned())
+}
+
+/// A number of neighbours, at least `LEAST`, at most 256.
+pub fn count<const LEAST: usize>(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse().ok().filter(|number| (LEAST..=256).contains(number));
+    number.ok_or_else(|| format!("{text:?} is not a whole number from {LEAST} to 256"))
+}
+
+/// `--viewpoint`.
+pub fn point(text: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
+        _ => Err(format!("{text:?} is not X,Y,Z, three finite numbers")),
+    }
+}
+
+/// `--outliers`.
+pub fn outliers(text: &str) -> Result<Outliers, String> {
+    let (name, numbers) = text.split_once(':').map_or((text, None), |(name, numbers)| (name, Some(numbers)));
+    let pair =
+        numbers.map(|numbers| numbers.split_once(',').ok_or(format!("{numbers:?} is not two numbers")));
+    match (name, pair.transpose()?) {
+        ("none", None) => Ok(Outliers::Keep),
+        ("statistical", None) => Ok(Outliers::Statistical { neighbors: 8, sigmas: 3.0 }),
+        ("statistical", Some((k, sigmas))) => {
+            Ok(Outliers::Statistical { neighbors: count::<1>(k)?, sigmas: positive(sigmas)? })
+        }
+        ("radius", Some((radius, n))) => {
+            Ok(Outliers::Radius { radius: positive(radius)?, count: count::<1>(n)? })
+        }
+        _ => Err("expected none, statistical, statistical:K,SIGMAS or radius:R,N".to_owned()),
+    }
 }
 
 /// `--focus`: a depth greater than 0, or `inf`.
@@ -300,6 +340,10 @@ mod tests {
     fn numbers() {
         assert_eq!(positive("2.8"), Ok(2.8));
         refused(positive, &["0", "-1", "inf", "nan", "", "1x"]);
+        assert_eq!(count::<3>("3"), Ok(3));
+        refused(count::<3>, &["2", "257", "-1", "4.5", ""]);
+        assert_eq!(point("1, -2,3e6"), Ok(DVec3::new(1.0, -2.0, 3e6)));
+        refused(point, &["1,2", "1,2,3,4", "1,2,inf", "a,b,c", ""]);
         assert_eq!(focus("3"), Ok(3.0));
         assert_eq!(focus("inf"), Ok(f64::INFINITY));
         refused(focus, &["0", "-inf", "nan", "far"]);
@@ -307,6 +351,18 @@ mod tests {
         refused(cutoff, &["0", "65", "nan"]);
         assert_eq!([blades("0"), blades("3"), blades("64")], [Ok(0), Ok(3), Ok(64)]);
         refused(blades, &["1", "2", "65", "-3", "3.5"]);
+    }
+
+    #[test]
+    fn outlier_filters() {
+        assert_eq!(outliers("none"), Ok(Outliers::Keep));
+        assert_eq!(outliers("statistical"), Ok(Outliers::Statistical { neighbors: 8, sigmas: 3.0 }));
+        assert_eq!(outliers("statistical:16,2.5"), Ok(Outliers::Statistical { neighbors: 16, sigmas: 2.5 }));
+        assert_eq!(outliers("radius:0.5,3"), Ok(Outliers::Radius { radius: 0.5, count: 3 }));
+        refused(
+            outliers,
+            &["", "all", "none:1,2", "radius", "radius:1", "radius:0,3", "statistical:0,1", "statistical:8"],
+        );
     }
 
     #[test]

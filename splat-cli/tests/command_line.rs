@@ -127,6 +127,72 @@ fn map_coordinates_change_nothing() {
     assert!(agree as f64 >= 0.999 * near.len() as f64, "{agree} of {}", near.len());
 }
 
+/// The sphere's points alone, some of them moved, and one far away.
+fn bare_points(centre: DVec3) -> Cloud {
+    let sphere = sphere(centre);
+    let points: Vec<DVec3> = (0..2000)
+        .map(|i| (i, sphere.world_position(i)))
+        .map(|(i, p)| {
+            if i == 77 {
+                centre + 9.0 * DVec3::X
+            } else {
+                centre + (p - centre) * (1.0 + 1e-3 * (i % 7) as f64)
+            }
+        })
+        .collect();
+    Cloud::from_points(&points)
+}
+
+#[test]
+fn a_prepared_cloud_is_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let shift = DVec3::new(500_000.0, 5_000_000.0, 100.0);
+    for (name, at) in [("near", DVec3::ZERO), ("far", shift)] {
+        write_ply(&folder.path().join(format!("{name}.ply")), &bare_points(at), PlyEncoding::Binary).unwrap();
+        for options in
+            ["", "--orient graph --outliers statistical --radius-scale 1.2", "--orient up --radius 0.1"]
+        {
+            let size = "--size 200x150 --spp 4";
+            succeeds(folder.path(), &format!("render {name}.ply -o raw.png {size} {options}"));
+            succeeds(folder.path(), &format!("prepare {name}.ply -o once.ply {options}"));
+            succeeds(folder.path(), &format!("render once.ply -o prepared.png {size}"));
+            let pixels = |name: &str| read_png(&folder.path().join(name));
+            assert!(pixels("raw.png") == pixels("prepared.png"), "{name} {options}");
+            // What is complete stays as it is.
+            let output = succeeds(folder.path(), "prepare once.ply -o twice.ply");
+            assert!(String::from_utf8_lossy(&output.stderr).contains("nothing was missing"));
+            let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
+            assert!(bytes("once.ply") == bytes("twice.ply"), "{name} {options}");
+        }
+    }
+    let output = succeeds(folder.path(), "prepare near.ply -o once.ply --outliers statistical -v");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("1999 points") && message.contains("1 outliers dropped"), "{message}");
+}
+
+#[test]
+fn a_crop_of_a_shaded_picture_is_a_part_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ply(&folder.path().join("in.ply"), &bare_points(DVec3::ZERO), PlyEncoding::Binary).unwrap();
+    let line = "render in.ply --size 160x120 --spp 4 --shading edl --background 0,0,1";
+    succeeds(folder.path(), &format!("{line} -o whole.png"));
+    succeeds(folder.path(), &format!("{line} -o part.png --crop 40,30,100,90"));
+    let [(_, _, whole), (width, height, part)] =
+        ["whole.png", "part.png"].map(|name| read_png(&folder.path().join(name)));
+    assert_eq!((width, height), (60, 60));
+    let at = |x: u32, y: u32| whole[((y + 30) * 160 + x + 40) as usize];
+    assert!((0..60).all(|y| (0..60).all(|x| part[(y * 60 + x) as usize] == at(x, y))));
+    succeeds(
+        folder.path(),
+        "render in.ply --size 160x120 --spp 4 --background 0,0,1 -o plain.png --shading headlight",
+    );
+    let (_, _, plain) = read_png(&folder.path().join("plain.png"));
+    assert!(plain.iter().zip(&whole).any(|(a, b)| a != b) && plain[0] == whole[0]);
+    for wrong in ["--shading edl --samples 0:2", "--shading edl --resolve over", "--edl-strength 2"] {
+        fails(folder.path(), &format!("render in.ply -o out.png {wrong}"), 2);
+    }
+}
+
 #[test]
 fn the_engines_write_the_same_file() {
     let folder = tempfile::tempdir().unwrap();

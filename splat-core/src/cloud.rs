@@ -35,6 +35,8 @@ pub struct Cloud {
     /// Whether these are trained Gaussian splats, to be blended one by one ([`splat_abuffer::Resolve::Over`]) and not
     /// joined into surfaces. The renderer does as its options say; this is for whoever chooses them.
     pub trained: bool,
+    /// Which points belong to no surface (see [`crate::prepare::Outliers`]), and are skipped; `None`: nobody has looked.
+    pub outliers: Option<Vec<bool>>,
     /// What else was measured at each splat. The renderer passes over it, whatever it is: it can be made into
     /// colours.
     pub fields: Vec<Field>,
@@ -118,6 +120,8 @@ impl TextureCoordinates {
 /// Why a splat is never rendered. SPEC section 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Defect {
+    /// [`Cloud::outliers`] says that it belongs to no surface.
+    Outlier,
     /// A coordinate, normal, size, colour, harmonic, opacity, area or texture coordinate is infinite or not a number.
     NotFinite,
     /// The normal, or the area spanned by the two axes, is zero.
@@ -134,6 +138,7 @@ impl Defect {
     /// The name of the cause in statistics.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Outlier => "outlier",
             Self::NotFinite => "not_finite",
             Self::ZeroNormal => "zero_normal",
             Self::NegativeSize => "negative_size",
@@ -187,6 +192,7 @@ impl Cloud {
             ("opacities", self.opacities.as_ref().map(Vec::len)),
             ("areas", self.areas.as_ref().map(Vec::len)),
             ("texture coordinates", self.texture_coordinates.as_ref().map(Vec::len)),
+            ("outliers", self.outliers.as_ref().map(Vec::len)),
         ];
         let fields = self.fields.iter().map(|field| ("field", Some(field.values.len())));
         for (what, length) in lengths.into_iter().chain(fields) {
@@ -197,11 +203,44 @@ impl Cloud {
         Ok(())
     }
 
+    /// Whether the point is marked as belonging to no surface.
+    #[inline]
+    pub fn is_outlier(&self, index: usize) -> bool {
+        self.outliers.as_ref().is_some_and(|outliers| outliers[index])
+    }
+
+    /// Takes the marked outliers out, so that what follows them moves up.
+    pub fn remove_outliers(&mut self) {
+        fn retain<T>(values: &mut Vec<T>, outliers: &[bool]) {
+            let mut outliers = outliers.iter();
+            values.retain(|_| !outliers.next().is_some_and(|&outlier| outlier));
+        }
+        let Some(outliers) = self.outliers.take() else { return };
+        retain(&mut self.positions, &outliers);
+        retain(&mut self.normals, &outliers);
+        match &mut self.shapes {
+            Shapes::Discs(sizes) => retain(sizes, &outliers),
+            Shapes::Ellipses(axes) => retain(axes, &outliers),
+        }
+        if let Some(colors) = &mut self.colors {
+            retain(colors, &outliers);
+        }
+        for values in [&mut self.opacities, &mut self.areas].into_iter().flatten() {
+            retain(values, &outliers);
+        }
+        if let Some(coordinates) = &mut self.texture_coordinates {
+            retain(coordinates, &outliers);
+        }
+    }
+
     /// Why the splat must not be rendered, or `None` if it is fit. SPEC section 2.
     ///
     /// Expects a cloud whose arrays belong together and whose normals are known.
     #[inline]
     pub fn defect(&self, index: usize) -> Option<Defect> {
+        if self.is_outlier(index) {
+            return Some(Defect::Outlier);
+        }
         let finite = self.positions[index].is_finite()
             && self.normals[index].is_finite()
             && self.colors.as_ref().is_none_or(|colors| colors[index].is_finite())
@@ -235,9 +274,10 @@ impl Cloud {
         self.fields.iter().find(|field| field.name.eq_ignore_ascii_case(name))
     }
 
-    /// Least and greatest world position of the finite points, or `None` if there is none.
+    /// Least and greatest world position of the finite points that are no outliers, or `None` if there is none.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let finite = self.positions.iter().filter(|p| p.is_finite()).map(|p| p.as_dvec3());
+        let points = self.positions.iter().enumerate();
+        let finite = points.filter(|&(i, p)| p.is_finite() && !self.is_outlier(i)).map(|(_, p)| p.as_dvec3());
         finite
             .fold(None, |bounds: Option<(DVec3, DVec3)>, p| {
                 Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))

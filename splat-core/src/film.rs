@@ -175,6 +175,41 @@ impl Film {
         paste_optional(&mut self.variance, part.variance.as_deref(), target);
     }
 
+    /// The part of this film in `window`, which lies within its own.
+    pub fn part(&self, window: PixelRect) -> Self {
+        fn cut<T: Copy>(values: &[T], whole: PixelRect, part: PixelRect) -> Vec<T> {
+            let rows = (part.y0..part.y1).map(|y| (y - whole.y0) as usize * whole.width());
+            let start = |row: usize| row + (part.x0 - whole.x0) as usize;
+            rows.flat_map(|row| &values[start(row)..start(row) + part.width()]).copied().collect()
+        }
+        let whole = self.window;
+        Self {
+            frame: self.frame,
+            window,
+            rgba: cut(&self.rgba, whole, window),
+            depth: self.depth.as_ref().map(|values| cut(values, whole, window)),
+            normal: self.normal.as_ref().map(|values| cut(values, whole, window)),
+            albedo: self.albedo.as_ref().map(|values| cut(values, whole, window)),
+            position: self.position.as_ref().map(|values| cut(values, whole, window)),
+            position_origin: self.position_origin,
+            id: self.id.as_ref().map(|values| cut(values, whole, window)),
+            coverage: self.coverage.as_ref().map(|values| cut(values, whole, window)),
+            layers: self.layers.as_ref().map(|values| cut(values, whole, window)),
+            samples: self.samples.as_ref().map(|values| cut(values, whole, window)),
+            variance: self.variance.as_ref().map(|values| cut(values, whole, window)),
+        }
+    }
+
+    /// Puts linear red, green, blue, and alpha behind the picture.
+    pub fn put_behind(&mut self, background: [f32; 4]) {
+        let [red, green, blue, alpha] = background;
+        let behind = [red * alpha, green * alpha, blue * alpha, alpha];
+        for rgba in &mut self.rgba {
+            let transmittance = 1.0 - rgba[3];
+            rgba.iter_mut().zip(behind).for_each(|(value, behind)| *value += transmittance * behind);
+        }
+    }
+
     /// Width of the window, in pixels.
     pub fn width(&self) -> usize {
         self.window.width()

@@ -27,18 +27,17 @@ impl Cloud {
             texture_coordinates: self.texture_coordinates.as_ref().map(|values| pick(values, kept)),
             oriented: self.oriented,
             trained: self.trained,
+            outliers: self.outliers.as_ref().map(|values| pick(values, kept)),
             fields: self.fields.iter().map(field).collect(),
         }
     }
 
     /// Whether clouds go together only once all their normals and sizes are known ([`crate::prepare`]): some have normals
     /// and some have none, or some are round and some are not.
-    pub fn differ(clouds: &[Self]) -> bool {
-        let mixed = |has: fn(&Self) -> bool| {
-            clouds.iter().any(has) && !clouds.iter().filter(|cloud| !cloud.is_empty()).all(has)
-        };
-        mixed(|cloud| !cloud.normals.is_empty())
-            || mixed(|cloud| !cloud.is_empty() && matches!(cloud.shapes, Shapes::Ellipses(_)))
+    pub fn differ<'a>(clouds: impl Iterator<Item = &'a Self> + Clone) -> bool {
+        let there = clouds.filter(|cloud| !cloud.is_empty());
+        let mixed = |has: fn(&Self) -> bool| there.clone().any(has) && !there.clone().all(has);
+        mixed(|cloud| cloud.normals.is_empty()) || mixed(|cloud| matches!(cloud.shapes, Shapes::Ellipses(_)))
     }
 
     /// Joins clouds: the splats of the first one come first.
@@ -70,6 +69,7 @@ impl Cloud {
         if joined.harmonics.is_none() {
             joined.colors = filled(&clouds, |cloud| cloud.colors.as_deref(), Vec3::from(UNCOLORED_LIT));
         }
+        joined.outliers = filled(&clouds, |cloud| cloud.outliers.as_deref(), false);
         joined.opacities = filled(&clouds, |cloud| cloud.opacities.as_deref(), 1.0);
         joined.texture_coordinates =
             filled(&clouds, |cloud| cloud.texture_coordinates.as_deref(), TextureCoordinates::default());
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(Cloud::join(vec![one.clone()]).unwrap(), one);
         assert_eq!(Cloud::join(vec![Cloud::default(), one.clone()]).unwrap(), one);
         assert_eq!(Cloud::join(vec![Cloud::default(); 2]).unwrap(), Cloud::default());
-        assert!(!Cloud::differ(&[Cloud::default(), one]));
+        assert!(!Cloud::differ([Cloud::default(), one].iter()));
     }
 
     #[test]
@@ -191,7 +191,7 @@ mod tests {
             fields: vec![Field { name: "intensity".to_owned(), values: vec![7.0] }],
             ..cloud(DVec3::ZERO, 1)
         };
-        assert!(Cloud::differ(&[plain.clone(), rich.clone()]));
+        assert!(Cloud::differ([plain.clone(), rich.clone()].iter()));
         let all = Cloud::join(vec![rich.clone(), plain.clone()]).unwrap();
         assert!(all.check_lengths().is_ok() && all.fields.is_empty());
         assert_eq!(all.colors.unwrap()[1], Vec3::from(UNCOLORED_LIT));
@@ -201,7 +201,7 @@ mod tests {
         let both = Cloud::join(vec![rich.clone(), rich]).unwrap();
         assert_eq!(both.field("intensity").unwrap().values, [7.0, 7.0]);
         let bare = Cloud { normals: Vec::new(), ..plain.clone() };
-        assert!(Cloud::differ(&[plain.clone(), bare.clone()]));
+        assert!(Cloud::differ([plain.clone(), bare.clone()].iter()));
         assert!(Cloud::join(vec![plain, bare]).unwrap_err().to_string().contains("normals"));
     }
 

@@ -7,6 +7,7 @@ pub mod cloud;
 pub mod distortion;
 pub mod error;
 pub mod evaluate;
+pub mod eye_dome;
 pub mod film;
 pub mod fit;
 pub mod harmonics;

@@ -78,8 +78,8 @@ pub fn sphere(center: DVec3, radius: f64, count: usize, options: &RenderOptions)
         ..Cloud::from_points(&points)
     };
     let options =
-        PrepareOptions { kernel: options.kernel, cutoff: options.cutoff, areas: true, size_scale: 1.0 };
-    prepare(&mut cloud, &options);
+        PrepareOptions { kernel: options.kernel, cutoff: options.cutoff, ..PrepareOptions::default() };
+    prepare(&mut cloud, &options, &mut |_| {});
     cloud
 }
 

@@ -113,7 +113,7 @@ fn checks(cloud: &Cloud) -> Vec<Vec3> {
 fn real(name: &'static str, about: &'static str, path: &Path, width: u32) -> anyhow::Result<Subjects> {
     let mut cloud = splat_io::read_ply(path).context("a cloud")?.cloud;
     let RenderOptions { kernel, cutoff, .. } = RenderOptions::default();
-    prepare(&mut cloud, &PrepareOptions { kernel, cutoff, areas: true, size_scale: 1.0 });
+    prepare(&mut cloud, &PrepareOptions { kernel, cutoff, ..PrepareOptions::default() }, &mut |_| {});
     let options = defaults(if cloud.colors.is_some() { Shading::Color } else { Shading::Headlight });
     let framing = Framing {
         width,

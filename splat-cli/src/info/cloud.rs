@@ -4,6 +4,7 @@ use crate::describe;
 use crate::values::Columns;
 use glam::{DVec3, Vec3};
 use serde::Serialize;
+use splat_core::prepare::unknown_sizes;
 use splat_core::{Cloud, Field, Shapes, SphericalHarmonics};
 use splat_io::{CloudOptions, Import, ImportReport, Usage, decimals, read_cloud};
 use std::collections::BTreeMap;
@@ -180,7 +181,7 @@ fn sizes(cloud: &Cloud) -> Sizes {
         }
     };
     let known: Vec<f64> = sizes.into_iter().filter(|&size| size.is_finite() && size > 0.0).collect();
-    Sizes { shape, known: known.len(), unknown: describe::unknown_sizes(cloud), range: spread(&known) }
+    Sizes { shape, known: known.len(), unknown: unknown_sizes(cloud), range: spread(&known) }
 }
 
 /// Least, mean and greatest of numbers.

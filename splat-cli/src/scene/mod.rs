@@ -6,16 +6,17 @@
 
 mod print;
 
-use crate::arguments::{Arguments, Command, RenderArguments};
+use crate::arguments::{Arguments, CloudArguments, Command, RenderArguments};
 use crate::usage::UsageError;
-use crate::{describe, resolve};
-use anyhow::bail;
+use crate::{describe, material, resolve};
+use anyhow::{anyhow, bail};
 use clap::builder::ValueParser;
 use clap::parser::ValueSource;
-use clap::{Arg, ArgMatches, CommandFactory, FromArgMatches};
+use clap::{Arg, ArgMatches, CommandFactory, FromArgMatches, Parser};
 use glam::DAffine3;
+use splat_core::placement::scale_of;
 use splat_io::read_scene;
-use splat_io::scene_file::{SceneFile, Section, Setting, Value};
+use splat_io::scene_file::{CloudEntry, SceneFile, Section, Setting, Value};
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::io::Write;
@@ -28,6 +29,53 @@ pub struct Scene {
     pub path: PathBuf,
     /// What it holds; paths of clouds are relative to the file's folder.
     pub file: SceneFile,
+}
+
+/// An input: a cloud's file, where the cloud stands, and what else is said of it.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    /// Where the cloud stands.
+    pub to_world: DAffine3,
+    /// What is said of it alone; of all clouds what the options say.
+    pub settings: CloudArguments,
+}
+
+impl Source {
+    /// Whether anything is said of it that is not said of all, or its shape is changed.
+    pub fn is_special(&self) -> bool {
+        let CloudArguments { colors, material, radius_scale, opacity, .. } = &self.settings;
+        let stands_out =
+            colors.color.is_some() || material.texture.is_some() || material.environment.is_some();
+        stands_out || *radius_scale != 1.0 || *opacity != 1.0 || scale_of(&self.to_world.matrix3).is_none()
+    }
+}
+
+/// The inputs of a command line, those of its scene file among them.
+///
+/// # Errors
+/// Settings of a cloud that there are not.
+pub fn sources(arguments: &RenderArguments) -> anyhow::Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for path in &arguments.inputs {
+        match &arguments.scene {
+            Some(scene) if scene.path == *path => {
+                for entry in &scene.file.clouds {
+                    let mut settings = scene.settings_of(entry)?;
+                    settings.reading.fill_in(&arguments.reading);
+                    let (path, to_world) = (scene.resolve(&entry.path), entry.to_world);
+                    sources.push(Source { path, to_world, settings });
+                }
+            }
+            _ => {
+                let mut settings = CloudArguments::parse_from::<_, &str>([]);
+                settings.reading = arguments.reading.clone();
+                sources.push(Source { path: path.clone(), to_world: DAffine3::IDENTITY, settings });
+            }
+        }
+    }
+    Ok(sources)
 }
 
 /// Whether an input is a scene file, by its name.
@@ -151,6 +199,31 @@ impl Scene {
             }
         }
         Ok(options)
+    }
+
+    /// What is said of a cloud, besides where it is.
+    fn settings_of(&self, entry: &CloudEntry) -> anyhow::Result<CloudArguments> {
+        let mut command = CloudArguments::command();
+        command.build();
+        let mut line = Vec::new();
+        for setting in &entry.settings {
+            let arg = command.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
+            let Some(arg) = arg else {
+                let names: Vec<&str> = command.get_arguments().filter_map(Arg::get_long).collect();
+                bail!(
+                    "{}: line {}: found `{}`, expected path, translate, rotate, scale, matrix, or one of {}",
+                    self.path.display(),
+                    setting.line,
+                    setting.name,
+                    names.join(", ")
+                );
+            };
+            line.extend(self.written(arg, setting)?);
+        }
+        let settings = CloudArguments::try_parse_from(line)
+            .map_err(|error| anyhow!("{}: {}", self.path.display(), error.to_string().trim_end()))?;
+        material::check(&settings.material)?;
+        Ok(settings)
     }
 
     /// The option that a setting stands for.

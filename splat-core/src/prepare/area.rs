@@ -1,9 +1,10 @@
 //! The area that each splat stands for: SPEC section 4.
 
-use super::{Neighbors, PrepareOptions};
+use super::PrepareOptions;
+use super::neighbors::Neighbors;
 use crate::setup::{InverseShape, splat_area};
 use crate::{Cloud, Shapes};
-use glam::DVec3;
+use rayon::prelude::*;
 
 /// Binary digits of the fixed-point sums, relative to the largest possible term: integers add up to the same sum in
 /// any order, and 2^40 splats of the largest weight fit.
@@ -17,24 +18,39 @@ const FRACTION: f64 = (1u128 << 80) as f64;
 /// less the more they turn away, down to nothing on the other side (1 where normals tell no sides). On the dragon and
 /// the bunny this leaves a tenth of the holes that distances along the plane and a sharp change of sides leave
 /// (ARCHITECTURE.md, "Areas").
-pub fn estimate(cloud: &Cloud, neighbors: &Neighbors, options: &PrepareOptions) -> Vec<f32> {
-    let radius = options.cutoff.sqrt();
+///
+/// `progress` is told the share done, 0 to 1.
+pub fn estimate(
+    cloud: &Cloud,
+    neighbors: &Neighbors,
+    options: &PrepareOptions,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<f32> {
     let integral = options.kernel.integral(options.cutoff);
     let fit: Vec<bool> = (0..cloud.len()).map(|index| cloud.defect(index).is_none()).collect();
     let inverse_area = |index: usize| 1.0 / (splat_area(cloud, index) * integral);
     let largest = (0..cloud.len()).filter(|&index| fit[index]).map(inverse_area).fold(0.0, f64::max);
 
-    let mut sums = vec![0u128; cloud.len()];
-    for (j, point) in neighbors.points().filter(|&(j, _)| fit[j]) {
-        let shape = InverseShape::new(cloud, j);
-        let scale = inverse_area(j) / largest * FRACTION;
-        for i in neighbors.within(point, radius * reach(cloud, j)) {
-            if fit[i] {
-                let offset = cloud.positions[i].as_dvec3() - DVec3::from(point);
-                let value = options.kernel.value(shape.r2(offset), options.cutoff);
-                sums[i] += (value * same_side(cloud, i, j) * scale) as u128;
+    // What the splats of a place add to the sums of others.
+    let terms = |place: usize| -> Vec<(usize, u128)> {
+        let mut terms = Vec::new();
+        for j in neighbors.members(place).filter(|&j| fit[j]) {
+            let shape = InverseShape::new(cloud, j);
+            let scale = inverse_area(j) / largest * FRACTION;
+            for near in neighbors.within(place, options.cutoff.sqrt() * reach(cloud, j)) {
+                let r2 = shape.r2(neighbors.place(near) - neighbors.place(place));
+                let value = options.kernel.value(r2, options.cutoff);
+                let term = |i| (i, (value * same_side(cloud, i, j) * scale) as u128);
+                terms.extend(neighbors.members(near).filter(|&i| fit[i]).map(term));
             }
         }
+        terms
+    };
+    let mut sums = vec![0u128; cloud.len()];
+    for block in neighbors.blocks() {
+        let found: Vec<Vec<(usize, u128)>> = block.clone().into_par_iter().map(terms).collect();
+        found.into_iter().flatten().for_each(|(index, term)| sums[index] += term);
+        progress(block.end as f64 / neighbors.len() as f64);
     }
     let area = |sum: u128| if sum == 0 { 0.0 } else { (FRACTION / largest / sum as f64) as f32 };
     sums.into_iter().map(area).collect()
