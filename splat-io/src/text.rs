@@ -21,7 +21,6 @@ use crate::whole_file::{read_whole, sha256};
 use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, Usage};
 use glam::Vec3;
 use layout::{Layout, is_comment};
-use splat_core::Cloud;
 use std::path::Path;
 
 /// The name of a column that is passed over.
@@ -46,84 +45,93 @@ pub fn read_text(path: &Path, columns: Option<&[String]>) -> Result<Import, Erro
 /// As [`read_text`].
 pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> Result<Import, Error> {
     check_text(bytes, path)?;
-    let Layout { names, names_line, separator, mut claimed, rows, mut assumptions } =
-        Layout::find(bytes, path, columns)?;
-
-    let used = names.iter().filter(|&name| name != SKIPPED);
-    let properties =
-        used.map(|name| Property { name: name.clone(), kind: Kind::Scalar(Scalar::F64) }).collect();
-    // A number takes two bytes, and so does a separator with it: no claim, but what the file has.
-    let most = rows.rest().len() / (2 * names.len()) + 1;
-    let count = rows.rest().iter().filter(|&&byte| byte == b'\n').count() + 1;
-    if count.min(most) >= u32::MAX as usize {
-        let what = format!("a text of {count} lines");
-        return Err(Error::limit(path, what, format!("{} points", u32::MAX - 1)));
-    }
-    let mut element =
-        Element { name: "points".to_owned(), count: count.min(most) as u64, line: names_line, properties };
+    let mut layout = Layout::find(bytes, path, columns)?;
+    let mut element = element(&layout, path)?;
     let mut columns = Columns::new(&element, path)?;
-    let mut property = 0;
-    let slots: Vec<Option<usize>> = names
-        .iter()
-        .map(|name| {
-            property += usize::from(name != SKIPPED);
-            if name == SKIPPED { None } else { columns.roles.slots[property - 1] }
-        })
-        .collect();
+    let mut of_properties = columns.roles.slots.clone().into_iter();
+    let slot = |name: &String| if name == SKIPPED { None } else { of_properties.next().flatten() };
+    let slots: Vec<Option<usize>> = layout.names.iter().map(slot).collect();
+    element.count = read_rows(&mut layout, &slots, &mut columns, path)?;
+    let Layout { names, separator, claimed, mut assumptions, .. } = layout;
+    check_claim(claimed, element.count, path, &mut assumptions)?;
 
-    let mut values: Row = [0.0; SLOTS];
-    let mut read = 0;
-    for (number, line) in rows {
-        if line.is_empty() || is_comment(line) {
-            continue;
-        }
-        if let Some(claim) = claimed.as_mut().filter(|_| names.len() > 1)
-            && let Some(more) = layout::count_line(line)
-        {
-            *claim = claim.saturating_add(more);
-            continue;
-        }
-        let mut words = separator.split(line);
-        for (slot, name) in slots.iter().zip(&names) {
-            let place = Place::Line(number);
-            let Some(word) = words.next() else {
-                let expected = format!("{} numbers, as in the first row: {name} is missing", names.len());
-                return Err(Error::invalid(path, place, "the end of the line", expected));
-            };
-            if let Some(slot) = *slot {
-                values[slot] = Scalar::F64.parse(word).map_err(|expected| {
-                    let expected = format!("{expected} with a decimal point for {name}");
-                    Error::invalid(path, place, quoted(word), expected)
-                })?;
-            }
-        }
-        if let Some(word) = words.next().filter(|word| !word.is_empty()) {
-            let expected = format!("the end of a row of {} numbers", names.len());
-            return Err(Error::invalid(path, Place::Line(number), quoted(word), expected));
-        }
-        columns.push(&values);
-        read += 1;
-    }
-    check_claim(claimed, read, path, &mut assumptions)?;
-
-    element.count = read;
     let mut outcome = columns.finish(Hints::default());
     let tone = outcome.cloud.colors.as_deref_mut().map(linearise);
     assumptions.append(&mut outcome.assumptions);
     assumptions.extend(tone);
     // What is said of colours there is not true of these, which are not linear.
     assumptions.extend(outcome.color_assumptions.drain(..).filter(|line| line.contains("opacities")));
-    let element = report(&names, &element, &outcome);
-    let cloud: Cloud = outcome.cloud;
     let report = ImportReport {
         path: path.to_owned(),
         format: format!("text, numbers between {}", separator.describe()),
         bytes: bytes.len() as u64,
         sha256: sha256(bytes),
-        elements: vec![element],
+        elements: vec![report(&names, &element, &outcome)],
         assumptions,
     };
-    Ok(Import { cloud, report })
+    Ok(Import { cloud: outcome.cloud, report })
+}
+
+/// The table of points: its columns, and at most how many rows it has.
+fn element(layout: &Layout<'_>, path: &Path) -> Result<Element, Error> {
+    let used = layout.names.iter().filter(|&name| name != SKIPPED);
+    let properties =
+        used.map(|name| Property { name: name.clone(), kind: Kind::Scalar(Scalar::F64) }).collect();
+    // A number and what ends it take two bytes: no claim, but what the file has.
+    let rest = layout.rows.rest();
+    let lines = rest.iter().filter(|&&byte| byte == b'\n').count() + 1;
+    let most = lines.min(rest.len() / (2 * layout.names.len()) + 1) as u64;
+    if most >= u64::from(u32::MAX) {
+        return Err(Error::limit(
+            path,
+            format!("a text of {lines} lines"),
+            format!("{} points", u32::MAX - 1),
+        ));
+    }
+    Ok(Element { name: "points".to_owned(), count: most, line: layout.names_line, properties })
+}
+
+/// Reads the rows and says how many there are. Further counts, as PTS files of several scans have them, are added to the
+/// first one.
+fn read_rows(
+    layout: &mut Layout<'_>,
+    slots: &[Option<usize>],
+    columns: &mut Columns,
+    path: &Path,
+) -> Result<u64, Error> {
+    let Layout { names, separator, claimed, rows, .. } = layout;
+    let mut values: Row = [0.0; SLOTS];
+    let mut read = 0;
+    for (number, line) in rows {
+        if line.is_empty() || is_comment(line) {
+            continue;
+        }
+        if let (Some(claim), Some(more)) = (claimed.as_mut(), layout::count_line(line)) {
+            *claim = claim.saturating_add(more);
+            continue;
+        }
+        let place = || Place::Line(number);
+        let mut words = separator.split(line);
+        for (slot, name) in slots.iter().zip(names.iter()) {
+            let Some(word) = words.next() else {
+                let expected = format!("{} numbers, as in the first row: {name} is missing", names.len());
+                return Err(Error::invalid(path, place(), "the end of the line", expected));
+            };
+            if let Some(slot) = *slot {
+                values[slot] = Scalar::F64.parse(word).map_err(|expected| {
+                    let expected = format!("{expected} with a decimal point for {name}");
+                    Error::invalid(path, place(), quoted(word), expected)
+                })?;
+            }
+        }
+        if let Some(word) = words.next().filter(|word| !word.is_empty()) {
+            let expected = format!("the end of a row of {} numbers", names.len());
+            return Err(Error::invalid(path, place(), quoted(word), expected));
+        }
+        columns.push(&values);
+        read += 1;
+    }
+    Ok(read)
 }
 
 /// Refuses what is certainly no text.

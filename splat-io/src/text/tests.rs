@@ -1,6 +1,7 @@
 //! Texts of every kind, made here.
 
 use super::*;
+use splat_core::Cloud;
 
 fn read(text: &str) -> Result<Import, Error> {
     read_text_from(text.as_bytes(), Path::new("a.xyz"), None)
