@@ -70,7 +70,7 @@ fn settings(defaults: &RenderOptions, quick: bool) -> Vec<Setting> {
     for &samples in counts {
         add("samples", samples.to_string(), RenderOptions { samples, ..base.clone() }, Core::Fast(best));
     }
-    for pattern in [PatternKind::Sobol, PatternKind::PoissonDisc] {
+    for pattern in PATTERN_KINDS {
         let name = pattern_name(pattern).into();
         add("pattern", name, RenderOptions { pattern, ..base.clone() }, Core::Fast(best));
     }
@@ -92,9 +92,14 @@ fn settings(defaults: &RenderOptions, quick: bool) -> Vec<Setting> {
     all
 }
 
+/// All kinds of patterns, the default first.
+pub const PATTERN_KINDS: [PatternKind; 3] =
+    [PatternKind::Dealt, PatternKind::Sobol, PatternKind::PoissonDisc];
+
 /// The name of a kind of pattern.
 pub fn pattern_name(pattern: PatternKind) -> &'static str {
     match pattern {
+        PatternKind::Dealt => "dealt",
         PatternKind::Sobol => "sobol",
         PatternKind::PoissonDisc => "poisson",
     }
