@@ -20,6 +20,11 @@ fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.split_first() {
         Some((command, rest)) if command == "report" => report::run(&report::Choices::parse(rest)?),
+        // What the report asks a process of its own.
+        Some((command, rest)) if command == "memory" => {
+            println!("{}", report::memory_of_arguments(rest)?);
+            Ok(())
+        }
         Some((help, _)) if help == "--help" || help == "-h" => {
             println!("{USAGE}");
             Ok(())

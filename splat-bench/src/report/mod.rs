@@ -15,12 +15,12 @@ mod parts;
 mod plot;
 mod scaling;
 mod scenes;
-mod timing;
 mod truth;
 mod whole;
 
 use anyhow::{Context as _, bail};
 use figures::Figures;
+pub use scaling::memory_of_arguments;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -104,7 +104,7 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     let quick = choices.quick;
     let mut context = Context {
         quick,
-        repetitions: if quick { 2 } else { 4 },
+        repetitions: if quick { 3 } else { 4 },
         width: if quick { 128 } else { 480 },
         truth_side: 23,
         cache: choices.cache.clone(),

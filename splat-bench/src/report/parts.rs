@@ -5,7 +5,7 @@ use super::figures::Kind;
 use super::html::{Block, Section};
 use super::plot::{Plot, Series, number};
 use super::scenes::Subjects;
-use super::timing::Times;
+use splat_bench::timing::Times;
 use super::whole::TABLES;
 use glam::{DVec2, DVec3};
 use splat_core::evaluate::{Hit, LensPoint, Limits, SplatConstants};

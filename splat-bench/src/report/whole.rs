@@ -7,7 +7,7 @@ use super::html::{Block, Section};
 use super::metrics::{Picture, distance, mean_flip};
 use super::plot::{Plot, Series, number};
 use super::scenes::Subjects;
-use super::timing::Times;
+use splat_bench::timing::Times;
 use super::truth::{Exact, Truth, cached};
 use rayon::prelude::*;
 use splat_core::sampling::SampleTable;
