@@ -14,6 +14,7 @@ report                  measures speed against error, and writes report.html, re
   --out FOLDER          where they go (default: report)
   --data FOLDER         a folder with surfels/, for the dragon and the pond (default: SPLAT_TEST_DATA)
   --cache FOLDER        where the true pictures are kept between runs (default: report-cache beside the program's folder)
+  --readme FILE         also writes the table between the markers of a README, and docs/images/report.svg beside it
   --compare FILE        the report.json of another run: prints what became slower or less accurate beyond noise";
 
 fn main() -> anyhow::Result<()> {

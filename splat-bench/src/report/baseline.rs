@@ -167,8 +167,9 @@ impl Changes {
         };
         let (worse, better) = (list("slower or less accurate", &self.worse), list("better", &self.better));
         let percent = 100.0 * self.least_time;
-        let noise =
-            format!("by the noise of these runs a time counts as changed from {percent:.0} % on, or more where it is itself noisy");
+        let noise = format!(
+            "by the noise of these runs a time counts as changed from {percent:.0} % on, or more where it is itself noisy"
+        );
         format!("{} figures compared; {noise}\n{worse}{better}", self.compared)
     }
 }
@@ -225,7 +226,11 @@ mod tests {
                         [2 * seed, 2 * seed + 1].map(|seed| measured(seed, repetitions, mean, 1.0, 1e-3));
                     let changes = compare(&before, &now).unwrap();
                     assert!(changes.worse.is_empty(), "{repetitions}, {mean}, {seed}: {}", changes.to_text());
-                    assert!(changes.better.is_empty(), "{repetitions}, {mean}, {seed}: {}", changes.to_text());
+                    assert!(
+                        changes.better.is_empty(),
+                        "{repetitions}, {mean}, {seed}: {}",
+                        changes.to_text()
+                    );
                 }
             }
         }

@@ -66,7 +66,7 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
                 row.push(slope.map_or(String::new(), |slope| format!("{slope:.2}")));
                 rows.push(row);
                 let points = errors.iter().map(|&[samples, rmse]| (samples, rmse, String::new())).collect();
-                series.push(Series { name, points, joined: true });
+                series.push(Series { name, points, joined: true, rings: false });
                 curves.push(errors);
             }
             for samples in JUDGED_AT {

@@ -6,8 +6,8 @@ use super::fit::exponent;
 use super::html::{Block, Section};
 use super::plot::{Plot, Series, number};
 use super::scenes::sphere_of;
-use splat_bench::timing::Times;
 use anyhow::bail;
+use splat_bench::timing::Times;
 use splat_bench::{bare_sphere, memory};
 use splat_core::{Camera, Cloud, Projection, RenderOptions};
 use splat_simd::{Level, Renderer};
@@ -47,8 +47,11 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
     let largest = if context.quick { 100_000 } else { 10_000_000 };
     let counts = [10_000usize, 30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000];
     context.say("scaling: clouds");
-    let clouds: Vec<(usize, Cloud)> =
-        counts.into_iter().filter(|&count| count <= largest).map(|count| (count, even_sphere(count))).collect();
+    let clouds: Vec<(usize, Cloud)> = counts
+        .into_iter()
+        .filter(|&count| count <= largest)
+        .map(|count| (count, even_sphere(count)))
+        .collect();
     // Sizes shrink with the spacing, so the overdraw stays.
     let splats: Vec<Point> =
         clouds.iter().map(|(count, _)| point(*count as f64, *count, &camera, &options, 1)).collect();
@@ -176,7 +179,8 @@ fn measure(
         let [frame, setup] = times.each_ref().map(Times::least);
         let fragments = statistics.fragments as f64;
         let arguments = point.arguments();
-        let memory = memory::of_child(&arguments.each_ref().map(String::as_str)).map(|bytes| bytes as f64 / 1e6);
+        let memory =
+            memory::of_child(&arguments.each_ref().map(String::as_str)).map(|bytes| bytes as f64 / 1e6);
         let size = number(point.size);
         let mut note = |quantity: &str, kind, value, noise| {
             context.figures.note_noisy([SECTION, axis, &size, quantity], kind, value, noise);
@@ -200,26 +204,19 @@ fn measure(
     }
     section.heading(axis);
     section.table(
-        &[
-            axis,
-            "frame, ms",
-            "set-up and tiles, ms",
-            "fragments",
-            "frame, ns a fragment",
-            "peak memory, MB",
-        ],
+        &[axis, "frame, ms", "set-up and tiles, ms", "fragments", "frame, ns a fragment", "peak memory, MB"],
         rows,
     );
     for (title, unit, curves) in [
-        (
-            "Time",
-            "time, ms",
-            vec![series("frame", &of_frame), series("set-up and tiles", &of_set_up)],
-        ),
+        ("Time", "time, ms", vec![series("frame", &of_frame), series("set-up and tiles", &of_set_up)]),
         ("Memory", "peak memory, MB", vec![series("peak memory", &of_memory)]),
     ] {
         let axes = [axis.to_owned(), unit.to_owned()];
-        section.blocks.push(Block::Plot(Plot { title: format!("{title} against {axis}"), axes, series: curves }));
+        section.blocks.push(Block::Plot(Plot {
+            title: format!("{title} against {axis}"),
+            axes,
+            series: curves,
+        }));
     }
     let mut words = Vec::new();
     for (what, curve) in
@@ -245,5 +242,5 @@ fn measure(
 
 fn series(name: &str, points: &[[f64; 2]]) -> Series {
     let points = points.iter().map(|&[x, y]| (x, y, String::new())).collect();
-    Series { name: name.into(), points, joined: true }
+    Series { name: name.into(), points, joined: true, rings: false }
 }

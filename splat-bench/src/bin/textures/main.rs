@@ -29,7 +29,12 @@ fn main() -> anyhow::Result<()> {
         ["--quick"] => (QUICK, None),
         ["--plot", file] => (FULL, Some(file)),
         ["--run", filter, anisotropy, count] => {
-            let time = measure::run(&images::all(images::data().as_deref())?[0], filter, anisotropy.parse()?, count.parse()?)?;
+            let time = measure::run(
+                &images::all(images::data().as_deref())?[0],
+                filter,
+                anisotropy.parse()?,
+                count.parse()?,
+            )?;
             println!("{time:.1}");
             return Ok(());
         }

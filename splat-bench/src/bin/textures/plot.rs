@@ -1,7 +1,7 @@
 //! Error against time, as SVG.
 
-use splat_bench::textures::measure::{Column, FILTERS, Measured, Method};
 use plotters::prelude::*;
+use splat_bench::textures::measure::{Column, FILTERS, Measured, Method};
 use splat_simd::Level;
 use std::error::Error;
 use std::path::Path;
