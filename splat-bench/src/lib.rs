@@ -1,8 +1,11 @@
-//! Scenes for the benchmarks: [`Case`] names one.
+//! Scenes for the benchmarks, [`Case`] names one; and what the programs measure with.
 
 #![forbid(unsafe_code)]
 
 mod case;
+pub mod memory;
+pub mod textures;
+pub mod timing;
 
 pub use case::{Blur, Case, Scene, Subject};
 
@@ -13,6 +16,14 @@ use splat_core::{Camera, Cloud, Kernel, PixelFilter, Projection, RenderOptions, 
 /// The benchmarks' sphere: `count` discs evenly spread over a sphere of radius 1, their size 1.5 spacings, with
 /// areas for cutoff 2.
 pub fn sphere(count: usize) -> Cloud {
+    let mut cloud = bare_sphere(count);
+    let options = PrepareOptions { kernel: Kernel::Gaussian, cutoff: 2.0, ..PrepareOptions::default() };
+    prepare(&mut cloud, &options, &mut |_| {});
+    cloud
+}
+
+/// The same without areas.
+pub fn bare_sphere(count: usize) -> Cloud {
     // Points on a spiral that turns by the golden angle: Fibonacci's lattice on the sphere.
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
     let points: Vec<DVec3> = (0..count)
@@ -28,8 +39,6 @@ pub fn sphere(count: usize) -> Cloud {
     cloud.normals = points.iter().map(|point| point.as_vec3()).collect();
     cloud.shapes = Shapes::Discs(vec![(1.5 * spacing) as f32; count]);
     cloud.oriented = true;
-    let options = PrepareOptions { kernel: Kernel::Gaussian, cutoff: 2.0, ..PrepareOptions::default() };
-    prepare(&mut cloud, &options, &mut |_| {});
     cloud
 }
 

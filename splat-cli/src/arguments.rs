@@ -237,7 +237,7 @@ pub struct SampleArguments {
     #[arg(long, value_name = "FILTER", default_value = "blackman-harris")]
     pub filter: FilterChoice,
     /// The set of sample positions
-    #[arg(long, value_name = "PATTERN", default_value = "sobol")]
+    #[arg(long, value_name = "PATTERN", default_value = "dealt")]
     pub pattern: PatternChoice,
     /// Seed of the sample positions
     #[arg(long, value_name = "N", default_value_t = 0)]

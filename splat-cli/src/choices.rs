@@ -64,6 +64,8 @@ pub enum PatternChoice {
     Poisson,
     /// Owen-scrambled Sobol points
     Sobol,
+    /// one such set for all patterns, dealt out for the least error at edges
+    Dealt,
 }
 
 impl From<PatternChoice> for PatternKind {
@@ -71,6 +73,7 @@ impl From<PatternChoice> for PatternKind {
         match choice {
             PatternChoice::Poisson => Self::PoissonDisc,
             PatternChoice::Sobol => Self::Sobol,
+            PatternChoice::Dealt => Self::Dealt,
         }
     }
 }
@@ -381,7 +384,7 @@ mod tests {
     fn the_words_are_those_of_the_specification() {
         assert_eq!(words::<UpChoice>(), ["y", "z", "-y", "-z"]);
         assert_eq!(words::<FilterChoice>(), ["box", "tent", "gaussian", "blackman-harris"]);
-        assert_eq!(words::<PatternChoice>(), ["poisson", "sobol"]);
+        assert_eq!(words::<PatternChoice>(), ["poisson", "sobol", "dealt"]);
         assert_eq!(words::<KernelChoice>(), ["gaussian", "windowed", "disc"]);
         assert_eq!(words::<TableChoice>(), ["floor256", "midpoint256", "lerp256", "quartic8", "poly8"]);
         assert_eq!(words::<ResolveChoice>(), ["surface", "over"]);

@@ -21,6 +21,7 @@ pub fn options(options: &RenderOptions) -> String {
     let pattern = match options.pattern {
         PatternKind::PoissonDisc => "poisson",
         PatternKind::Sobol => "sobol",
+        PatternKind::Dealt => "dealt",
     };
     let kernel = match options.kernel {
         Kernel::Gaussian => "gaussian",

@@ -72,7 +72,7 @@ impl Default for RenderOptions {
             sample_range: None,
             window: None,
             filter: PixelFilter::BlackmanHarris,
-            pattern: PatternKind::Sobol,
+            pattern: PatternKind::Dealt,
             seed: 0,
             kernel: Kernel::Windowed,
             cutoff: 4.0,

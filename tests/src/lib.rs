@@ -1,7 +1,9 @@
 //! The test oracle: what every renderer of this workspace is judged against.
 //!
 //! - [`analytic`]: what the analytic tests measure pictures by;
+//! - [`hard_cases`]: splats that are hard to evaluate, a family a case, and the errors of the listing and both cores;
 //! - [`hard_scenes`]: scenes that are meant to be hard for a renderer;
+//! - [`hard_surfaces`]: surfaces that are hard to tell apart, and sums of very many or very light fragments;
 //! - [`listing`]: the printed listing of Räsänen 2002, appendix A.2, faults included;
 //! - [`brute_force`]: the geometric truth in f64, by intersection and dense sampling;
 //! - [`core_scenes`]: scenes of `splat-core`, and the same for the brute-force truth;
@@ -17,7 +19,9 @@ pub mod analytic;
 pub mod brute_force;
 pub mod core_scenes;
 pub mod errata_scenes;
+pub mod hard_cases;
 pub mod hard_scenes;
+pub mod hard_surfaces;
 pub mod listing;
 pub mod printed_textures;
 pub mod random;

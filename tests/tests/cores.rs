@@ -359,7 +359,8 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let cutoff = prop_oneof![Just(2.0), Just(4.0), Just(9.0), 0.3..16.0];
     let thickness = prop_oneof![Just(0.0), Just(0.5), 0.0..4.0];
     let background = prop_oneof![2 => Just(None), 1 => Just(Some([0.2, 0.4, 0.1, 0.5]))];
-    let pattern = prop_oneof![Just(PatternKind::Sobol), Just(PatternKind::PoissonDisc)];
+    let pattern =
+        prop_oneof![Just(PatternKind::Dealt), Just(PatternKind::Sobol), Just(PatternKind::PoissonDisc)];
     (
         (resolve(), aovs(), thickness, background),
         (filter, pattern, 0u64..1000, samples()),
@@ -401,7 +402,7 @@ fn knowledge() -> impl Strategy<Value = Knowledge> {
 // Fragments and pictures of hard scenes
 
 /// What the hard scenes must have tried.
-const SORTS: [&str; 58] = [
+const SORTS: [&str; 59] = [
     // Kinds of splats; none of those behind the eye leaves a fragment.
     "Ordinary",
     "EdgeOn",
@@ -450,6 +451,7 @@ const SORTS: [&str; 58] = [
     "filter Tent",
     "filter Gaussian",
     "filter BlackmanHarris",
+    "Dealt",
     "Sobol",
     "PoissonDisc",
     "samples modulo 8: 0",

@@ -7,8 +7,8 @@ use super::html::{Block, Section};
 use super::metrics::{Picture, distance};
 use super::plot::{Plot, Series, number};
 use super::scenes::{Subjects, edges, smooth};
-use super::whole::{pattern_name, picture_of, truth_of};
-use splat_core::{PatternKind, PixelFilter, RenderOptions};
+use super::whole::{PATTERN_KINDS, pattern_name, picture_of, truth_of};
+use splat_core::{PixelFilter, RenderOptions};
 use splat_simd::{Level, Renderer};
 
 /// The name of this part among the figures.
@@ -46,7 +46,7 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
             [(PixelFilter::BlackmanHarris, "blackman-harris"), (PixelFilter::Box, "box")]
         {
             let mut curves = Vec::new();
-            for pattern in [PatternKind::Sobol, PatternKind::PoissonDisc] {
+            for pattern in PATTERN_KINDS {
                 let options = RenderOptions { filter, pattern, ..scene.options.clone() };
                 let errors = curve(&scene, &options, truth.of(filter), seeds)?;
                 let name = format!("{}, {filter_name}", pattern_name(pattern));
@@ -66,7 +66,7 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
                 row.push(slope.map_or(String::new(), |slope| format!("{slope:.2}")));
                 rows.push(row);
                 let points = errors.iter().map(|&[samples, rmse]| (samples, rmse, String::new())).collect();
-                series.push(Series { name, points, joined: true });
+                series.push(Series { name, points, joined: true, rings: false });
                 curves.push(errors);
             }
             for samples in JUDGED_AT {
@@ -76,7 +76,8 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
                         .find(|point| point[0] == f64::from(samples))
                         .map_or(f64::NAN, |point| point[1])
                 };
-                let gain = at(&curves[1]) / at(&curves[0]);
+                // Poisson-disc ones are the last.
+                let gain = at(&curves[curves.len() - 1]) / at(&curves[0]);
                 let setting = format!("{filter_name}, {samples} samples");
                 context.figures.note(
                     [SECTION, scene.name, &setting, "poisson over default"],

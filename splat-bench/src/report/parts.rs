@@ -5,9 +5,9 @@ use super::figures::Kind;
 use super::html::{Block, Section};
 use super::plot::{Plot, Series, number};
 use super::scenes::Subjects;
-use super::timing::Times;
 use super::whole::TABLES;
 use glam::{DVec2, DVec3};
+use splat_bench::timing::Times;
 use splat_core::evaluate::{Hit, LensPoint, Limits, SplatConstants};
 use splat_core::kernel::KernelTable;
 use splat_core::real::Real;
@@ -110,7 +110,7 @@ fn tables(section: &mut Section, context: &mut Context) {
             ]
             .into(),
         );
-        series.push(Series { name: subject, points, joined: false });
+        series.push(Series { name: subject, points, joined: false, rings: false });
     }
     section.table(&["kernel", "table", "max", "mean", "bias", "ns a value"], rows);
     let axes = ["ns a value, scalar".into(), "largest error".into()];

@@ -1,5 +1,6 @@
 //! Plots as SVG: points and lines over two logarithmic axes.
 
+use super::labels::Labels;
 use std::fmt::Write;
 
 /// A set of points.
@@ -11,6 +12,8 @@ pub struct Series {
     pub points: Vec<(f64, f64, String)>,
     /// Whether a line joins them.
     pub joined: bool,
+    /// Whether they are rings around other series' points.
+    pub rings: bool,
 }
 
 /// A plot over logarithmic axes.
@@ -24,13 +27,14 @@ pub struct Plot {
     pub series: Vec<Series>,
 }
 
-const SIZE: [f64; 2] = [640.0, 400.0];
+const SIZE: [f64; 2] = [700.0, 400.0];
 
 /// Left, right, top and bottom of the plot within the picture.
 const FRAME: [f64; 4] = [70.0, 470.0, 30.0, 350.0];
 
-/// Colours that are told apart also by the colour-blind (Okabe and Ito 2008).
-const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+/// Colours that are told apart also by the colour-blind (Okabe and Ito 2008, the light ones darker, and two more).
+const COLORS: [&str; 9] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b07800", "#3a9bd0", "#000000", "#7f3fbf", "#888888"];
 
 impl Plot {
     /// The plot as an `svg` element. Points without a logarithm are left out.
@@ -62,8 +66,14 @@ impl Plot {
             [left + part(x, ranges[0]) * (right - left), bottom - part(y, ranges[1]) * (bottom - top)]
         };
         self.write_axes(&mut svg, ranges, place);
+        let mut labels = Labels { area: FRAME, ..Labels::default() };
         for (number, series) in self.series.iter().enumerate() {
             let color = COLORS[number % COLORS.len()];
+            let mark = if series.rings {
+                format!("r=\"5\" fill=\"none\" stroke=\"{color}\"")
+            } else {
+                format!("r=\"3\" fill=\"{color}\"")
+            };
             let places: Vec<([f64; 2], &str)> = series
                 .points
                 .iter()
@@ -81,28 +91,23 @@ impl Plot {
                 );
             }
             for ([x, y], label) in places {
-                let (x_text, y_text) = (x + 5.0, y - 4.0);
-                write_line(
-                    &mut svg,
-                    &format!(
-                        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" fill=\"{color}\"/>\
-                     <text x=\"{x_text:.1}\" y=\"{y_text:.1}\" font-size=\"9\" fill=\"{color}\">{}</text>",
-                        escape(label)
-                    ),
-                );
+                write_line(&mut svg, &format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" {mark}/>"));
+                labels.points.push([x, y]);
+                labels.texts.push(([x, y], label.to_owned(), color));
             }
             let y = FRAME[2] + 8.0 + 16.0 * number as f64;
             let x = FRAME[1] + 15.0;
             write_line(
                 &mut svg,
                 &format!(
-                    "<circle cx=\"{x}\" cy=\"{y}\" r=\"4\" fill=\"{color}\"/><text x=\"{}\" y=\"{}\">{}</text>",
+                    "<circle cx=\"{x}\" cy=\"{y}\" {mark}/><text x=\"{}\" y=\"{}\" font-size=\"10\">{}</text>",
                     x + 8.0,
                     y + 4.0,
                     escape(&series.name)
                 ),
             );
         }
+        labels.write(&mut svg);
         svg + "</svg>\n"
     }
 
@@ -152,7 +157,7 @@ impl Plot {
     }
 }
 
-fn write_line(svg: &mut String, line: &str) {
+pub fn write_line(svg: &mut String, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(svg, "{line}");
 }
@@ -202,7 +207,7 @@ mod tests {
     #[test]
     fn a_plot_is_well_formed_and_shows_its_points() {
         let points = vec![(1.0, 0.1, "a<b".into()), (10.0, 0.01, "c".into()), (0.0, 1.0, "d".into())];
-        let series = vec![Series { name: "one".into(), points, joined: true }];
+        let series = vec![Series { name: "one".into(), points, joined: true, rings: false }];
         let svg = Plot { title: "t".into(), axes: ["x".into(), "y".into()], series }.to_svg();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
         // Two points and one entry of the legend; the point at 0 has no logarithm.

@@ -7,15 +7,15 @@ use super::html::{Block, Section};
 use super::metrics::{Picture, distance, mean_flip};
 use super::plot::{Plot, Series, number};
 use super::scenes::Subjects;
-use super::timing::Times;
 use super::truth::{Exact, Truth, cached};
 use rayon::prelude::*;
+use splat_bench::timing::Times;
 use splat_core::sampling::SampleTable;
 use splat_core::{Film, PatternKind, PixelFilter, RenderOptions, TableMode};
 use splat_simd::{Level, Renderer};
 
 /// The name of this part among the figures.
-const SECTION: &str = "whole";
+pub const SECTION: &str = "whole";
 
 /// Samples a pixel where another axis is varied.
 const SAMPLES: u32 = 16;
@@ -70,7 +70,7 @@ fn settings(defaults: &RenderOptions, quick: bool) -> Vec<Setting> {
     for &samples in counts {
         add("samples", samples.to_string(), RenderOptions { samples, ..base.clone() }, Core::Fast(best));
     }
-    for pattern in [PatternKind::Sobol, PatternKind::PoissonDisc] {
+    for pattern in PATTERN_KINDS {
         let name = pattern_name(pattern).into();
         add("pattern", name, RenderOptions { pattern, ..base.clone() }, Core::Fast(best));
     }
@@ -92,9 +92,14 @@ fn settings(defaults: &RenderOptions, quick: bool) -> Vec<Setting> {
     all
 }
 
+/// All kinds of patterns, the default first.
+pub const PATTERN_KINDS: [PatternKind; 3] =
+    [PatternKind::Dealt, PatternKind::Sobol, PatternKind::PoissonDisc];
+
 /// The name of a kind of pattern.
 pub fn pattern_name(pattern: PatternKind) -> &'static str {
     match pattern {
+        PatternKind::Dealt => "dealt",
         PatternKind::Sobol => "sobol",
         PatternKind::PoissonDisc => "poisson",
     }
@@ -305,6 +310,7 @@ fn plot(scene: &str, measured: &[Measured]) -> Plot {
             .map(|one| (one.times.least(), one.rmse, one.setting.name.clone()))
             .collect(),
         joined: axis == "samples",
+        rings: false,
     };
     let mut efficient: Vec<(f64, f64, String)> = measured
         .iter()
@@ -313,7 +319,12 @@ fn plot(scene: &str, measured: &[Measured]) -> Plot {
         .collect();
     efficient.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut series: Vec<Series> = AXES.into_iter().map(of).collect();
-    series.push(Series { name: "Pareto (same filter)".into(), points: efficient, joined: false });
+    series.push(Series {
+        name: "Pareto (same filter)".into(),
+        points: efficient,
+        joined: false,
+        rings: true,
+    });
     Plot {
         title: format!("{scene}: error against time"),
         axes: ["time of a frame, ms, one thread".into(), "RMSE".into()],

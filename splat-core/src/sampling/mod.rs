@@ -5,6 +5,7 @@
 //! pattern kind, filter, pixel and sample index.
 
 mod aperture;
+mod dealt;
 mod filter;
 mod poisson;
 mod sobol;
@@ -37,6 +38,9 @@ pub enum PatternKind {
     /// The first two dimensions of Sobol's sequence, Owen-scrambled: every elementary interval of a pattern holds
     /// its share of the points.
     Sobol,
+    /// One such set for all patterns, dealt out so that the points of each are far from each other: the least error at
+    /// edges.
+    Dealt,
 }
 
 /// The samples of every pixel.
@@ -80,10 +84,10 @@ impl SampleTable {
     pub fn new(options: &RenderOptions, lens: Option<Lens>, pixel_scale: DVec2) -> Self {
         let samples = options.samples as usize;
         let filter = FilterSampler::new(options.filter);
-        let points = patterns(options, Stream::FilterPoints);
+        let place = |point: [f64; 2]| point.map(|value| filter.jitter(value));
         Self {
             samples,
-            jitter: points.iter().map(|point| point.map(|value| filter.jitter(value))).collect(),
+            jitter: patterns(options, Stream::FilterPoints, place),
             lens: lens.map(|lens| LensSamples::new(options, lens, pixel_scale)),
             filter_selection: selection(&mut Stream::FilterSelection.generator(options.seed)),
         }
@@ -144,14 +148,13 @@ fn pattern_number(selection: &Selection, x: i32, y: i32) -> usize {
 
 impl LensSamples {
     fn new(options: &RenderOptions, lens: Lens, pixel_scale: DVec2) -> Self {
-        let mut points = patterns(options, Stream::LensPoints);
+        let mut unit = patterns(options, Stream::LensPoints, |point| on_aperture(point, lens.blades));
         // Sample j takes its place on the picture and its place on the lens from two patterns; a random order keeps
         // the two from moving together (erratum E16).
         let mut random = Stream::LensOrder.generator(options.seed);
-        for pattern in points.chunks_mut(options.samples as usize) {
+        for pattern in unit.chunks_mut(options.samples as usize) {
             shuffle(pattern, &mut random);
         }
-        let unit: Vec<[f32; 2]> = points.iter().map(|&point| on_aperture(point, lens.blades)).collect();
         let points = unit.iter().map(|&unit| LensPoint::new(unit, lens, pixel_scale)).collect();
         Self { unit, points, selection: selection(&mut Stream::LensSelection.generator(options.seed)) }
     }
@@ -165,15 +168,16 @@ impl<R: Real> LensPoint<R> {
     }
 }
 
-/// [`PATTERNS`] patterns of S points in the unit square, one after the other.
-fn patterns(options: &RenderOptions, stream: Stream) -> Vec<[f64; 2]> {
+/// [`PATTERNS`] patterns of S samples, one after the other, where `place` puts the points of the unit square.
+fn patterns(options: &RenderOptions, stream: Stream, place: impl Fn([f64; 2]) -> [f32; 2]) -> Vec<[f32; 2]> {
     let mut random = stream.generator(options.seed);
     let samples = options.samples as usize;
-    let one = |_| match options.pattern {
-        PatternKind::PoissonDisc => poisson::pattern(samples, &mut random),
-        PatternKind::Sobol => sobol::pattern(samples, &mut random),
+    let pattern = match options.pattern {
+        PatternKind::PoissonDisc => poisson::pattern,
+        PatternKind::Sobol => sobol::pattern,
+        PatternKind::Dealt => return dealt::patterns(samples, place, &mut random),
     };
-    (0..PATTERNS).flat_map(one).collect()
+    (0..PATTERNS).flat_map(|_| pattern(samples, &mut random)).map(place).collect()
 }
 
 /// A selection table in which every 8 x 8 block holds each pattern once, in random order. That spreads the patterns

@@ -8,10 +8,9 @@
 
 mod markdown;
 mod measure;
-mod memory;
 
-use anyhow::bail;
-use splat_bench::{Case, Subject};
+use anyhow::{Context, bail};
+use splat_bench::{Case, Subject, memory};
 
 const USAGE: &str = "\
 table                  the tables of docs/benchmarks.md
@@ -36,7 +35,7 @@ fn main() -> anyhow::Result<()> {
         }
         ["--frame", name, count] => println!("{}", measure::frames(Case::named(name)?, count.parse()?)?),
         ["--raster", name, count] => println!("{}", measure::rasters(Case::named(name)?, count.parse()?)?),
-        ["--memory", name] => println!("{}", memory::measure(Case::named(name)?)?),
+        ["--memory", name] => println!("{}", memory_of(Case::named(name)?)?),
         ["--help" | "-h"] => println!("{USAGE}"),
         ref names if names.iter().all(|name| !name.starts_with('-')) => {
             let cases = names.iter().map(|name| Case::named(name)).collect::<anyhow::Result<Vec<_>>>()?;
@@ -55,6 +54,13 @@ fn is_real(case: &Case) -> bool {
     matches!(case.subject, Subject::Dragon | Subject::Pond)
 }
 
+/// Bytes that a frame of a case takes on two threads.
+fn memory_of(case: Case) -> anyhow::Result<u64> {
+    let cloud = case.subject.cloud()?.with_context(|| case.subject.skipped())?;
+    let scene = case.scene(&cloud)?;
+    memory::of_frame(&cloud, &scene.camera, &scene.options, 2)
+}
+
 /// Measures cases, and prints the tables.
 fn tables(cases: &[Case], repetitions: usize) -> anyhow::Result<()> {
     let mut all = Vec::new();
@@ -66,7 +72,7 @@ fn tables(cases: &[Case], repetitions: usize) -> anyhow::Result<()> {
             continue;
         };
         for &case in cases {
-            let memory = memory::of_child(case);
+            let memory = memory::of_child(&["--memory", &case.to_string()]);
             let measured = measure::Measured { memory, ..measure::case(case, &cloud, repetitions)? };
             // Not to be lost if the rest is given up.
             eprintln!("{}", markdown::tables(std::slice::from_ref(&measured)));

@@ -4,13 +4,12 @@
 #![expect(clippy::print_stdout, reason = "what this program makes")]
 #![expect(clippy::print_stderr, reason = "what it is about, since it takes minutes")]
 
-mod images;
 mod markdown;
-mod measure;
 mod plot;
 
 use anyhow::bail;
-use measure::{ANISOTROPIES, Effort, SETS};
+use splat_bench::textures::measure::{ANISOTROPIES, Effort, SETS};
+use splat_bench::textures::{images, measure};
 
 const USAGE: &str = "\
 textures             the tables of docs/textures.md
@@ -30,7 +29,12 @@ fn main() -> anyhow::Result<()> {
         ["--quick"] => (QUICK, None),
         ["--plot", file] => (FULL, Some(file)),
         ["--run", filter, anisotropy, count] => {
-            let time = measure::run(&images::all()?[0], filter, anisotropy.parse()?, count.parse()?)?;
+            let time = measure::run(
+                &images::all(images::data().as_deref())?[0],
+                filter,
+                anisotropy.parse()?,
+                count.parse()?,
+            )?;
             println!("{time:.1}");
             return Ok(());
         }
@@ -40,7 +44,7 @@ fn main() -> anyhow::Result<()> {
         }
         _ => bail!("found {arguments:?}, expected\n{USAGE}"),
     };
-    let subjects = images::all()?;
+    let subjects = images::all(images::data().as_deref())?;
     if subjects.iter().all(|subject| subject.name != "photograph") {
         eprintln!("{}", images::skipped());
     }

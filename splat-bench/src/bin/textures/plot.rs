@@ -1,8 +1,7 @@
 //! Error against time, as SVG.
 
-use crate::markdown;
-use crate::measure::{Column, FILTERS, Measured, Method};
 use plotters::prelude::*;
+use splat_bench::textures::measure::{Column, FILTERS, Measured, Method};
 use splat_simd::Level;
 use std::error::Error;
 use std::path::Path;
@@ -56,7 +55,7 @@ fn chart(area: &Area<'_>, title: &str, column: &Column) -> Result<(), Box<dyn Er
         }
         let color = Palette99::pick(i).to_rgba();
         let at = |level: Option<Level>| {
-            let found = markdown::of(column, Method { filter, level });
+            let found = column.of(Method { filter, level });
             (found.time, 1e3 * found.errors[0])
         };
         let (scalar, lanes) = (at(None), at(Some(Level::Avx2)));

@@ -1,31 +1,35 @@
 //! The memory that a frame takes, as Linux counts it.
 
 use anyhow::Context;
-use splat_bench::Case;
+use splat_core::{Camera, Cloud, RenderOptions};
 use splat_simd::{Level, Renderer};
 use std::process::Command;
 
-/// [`measure`] in a process of its own. `None` where the system does not tell.
-pub fn of_child(case: Case) -> Option<u64> {
+/// The number that this program prints when it is run with these arguments, in a process of its own: [`of_frame`]. `None`
+/// where the system does not tell.
+pub fn of_child(arguments: &[&str]) -> Option<u64> {
     let mut child = Command::new(std::env::current_exe().ok()?);
-    child.args(["--memory", &case.to_string()]);
+    child.args(arguments);
     // What is freed shall go back to the system at once (glibc).
     child.envs([("MALLOC_MMAP_THRESHOLD_", "65536"), ("MALLOC_TRIM_THRESHOLD_", "65536")]);
     let output = child.output().ok().filter(|output| output.status.success())?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
 
-/// Bytes that a frame on two threads takes at its peak, beyond cloud and picture.
+/// Bytes that a frame takes at its peak, beyond cloud and picture.
 ///
 /// # Errors
 /// If it cannot be rendered, or the system does not tell.
-pub fn measure(case: Case) -> anyhow::Result<u64> {
-    let cloud = case.subject.cloud()?.with_context(|| case.subject.skipped())?;
-    let scene = case.scene(&cloud)?;
+pub fn of_frame(
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    threads: usize,
+) -> anyhow::Result<u64> {
     // The peak so far was that of making the cloud.
     std::fs::write("/proc/self/clear_refs", "5").context("a peak that can be reset")?;
-    let mut renderer = Renderer::new(2, Level::choose())?;
-    let rendered = renderer.render(&cloud, &scene.camera, &scene.options, &mut |_| {})?;
+    let mut renderer = Renderer::new(threads, Level::choose())?;
+    let rendered = renderer.render(cloud, camera, options, &mut |_| {})?;
     let peak = status("VmHWM:")?;
     drop(renderer);
     let rest = status("VmRSS:")?;

@@ -1,6 +1,7 @@
 //! Times and errors.
 
-use crate::images::{Lookups, Subject};
+use super::images::{Lookups, Subject};
+use crate::timing::Times;
 use anyhow::Context;
 use splat_core::texture::filter::Average;
 use splat_core::texture::{Filter, Probes, Quality, Sampler};
@@ -41,16 +42,21 @@ pub struct Effort {
 /// A filter of the scalar core (no level) or of lanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Method {
+    /// The filter.
     pub filter: Filter,
+    /// The level of lanes.
     pub level: Option<Level>,
 }
 
 /// What is known of a method for one image, set and anisotropy.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured {
+    /// The method.
     pub method: Method,
     /// Nanoseconds a lookup: the least of all repetitions.
     pub time: f64,
+    /// How far the median of the repetitions is above the least, relative to it.
+    pub noise: f64,
     /// Texels read by a lookup, in the mean.
     pub texels: f64,
     /// Root mean squared and greatest error.
@@ -58,11 +64,21 @@ pub struct Measured {
 }
 
 /// Everything of one image, set and anisotropy.
+#[derive(Debug)]
 pub struct Column {
+    /// Major over minor semi-axis.
     pub anisotropy: f64,
+    /// Every method, in the order of [`Method::all`].
     pub methods: Vec<Measured>,
     /// The root mean squared error of the printed EWA at its best width.
     pub best_printed: f64,
+}
+
+impl Column {
+    /// What was measured of a method.
+    pub fn of(&self, method: Method) -> &Measured {
+        self.methods.iter().find(|found| found.method == method).unwrap_or(&self.methods[0])
+    }
 }
 
 /// Every filter with its name.
@@ -90,6 +106,16 @@ impl Method {
             }
         }
         methods
+    }
+
+    /// The filter's name.
+    pub fn name(self) -> &'static str {
+        FILTERS.iter().find(|(_, filter)| *filter == self.filter).map_or("", |(name, _)| name)
+    }
+
+    /// The core's name.
+    pub fn core(self) -> &'static str {
+        self.level.map_or("scalar", |level| level.name())
     }
 
     fn sampler(self, width: f64) -> Sampler {
@@ -140,13 +166,11 @@ pub fn column(subject: &Subject, set: usize, anisotropy: f64, effort: Effort) ->
     let methods = Method::all();
 
     let timed = 64 * effort.tiles[fewer];
-    let mut times = vec![f64::INFINITY; methods.len()];
+    let mut times = vec![Times::default(); methods.len()];
     // One after the other, so that what slows the machine for a while slows them all.
     for _ in 0..effort.repetitions {
         for (method, time) in methods.iter().zip(&mut times) {
-            let start = Instant::now();
-            method.run(subject, &lookups, &mut found[..timed], 1.0);
-            *time = time.min(start.elapsed().as_nanos() as f64 / timed as f64);
+            time.measure(|| method.run(subject, &lookups, &mut found[..timed], 1.0));
             black_box(&mut found);
         }
     }
@@ -161,9 +185,10 @@ pub fn column(subject: &Subject, set: usize, anisotropy: f64, effort: Effort) ->
     let printed = methods[0];
     let of_width = |width: u32| errors(printed, 0.1 * f64::from(width)).0[0];
     let best_printed = WIDTHS.map(of_width).fold(f64::INFINITY, f64::min);
-    let measured = methods.iter().zip(&times).map(|(&method, &time)| {
+    let measured = methods.iter().zip(&times).map(|(&method, times)| {
         let (errors, texels) = errors(method, 1.0);
-        Measured { method, time, texels, errors }
+        let time = 1e6 * times.least() / timed as f64;
+        Measured { method, time, noise: times.noise(), texels, errors }
     });
     let methods = measured.collect();
     Column { anisotropy, methods, best_printed }

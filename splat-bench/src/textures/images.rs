@@ -7,7 +7,7 @@ use splat_core::texture::Wrap;
 use splat_simd::texture::{LanePyramid, Lookup as Request};
 use splat_tests::random::Random;
 use splat_tests::texture_truth::{Image, Lookup};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The environment variable that names the folder of real files.
 const DATA: &str = "SPLAT_TEST_DATA";
@@ -16,26 +16,39 @@ const DATA: &str = "SPLAT_TEST_DATA";
 const TILE: usize = 8;
 
 /// An image in both cores.
+#[derive(Debug)]
 pub struct Subject {
+    /// Its name.
     pub name: &'static str,
+    /// Its texels.
     pub image: Image,
+    /// The scalar core's.
     pub pyramid: splat_core::texture::Pyramid,
+    /// That of lanes.
     pub lanes: LanePyramid,
 }
 
 /// Lookups of one anisotropy, tile by tile.
+#[derive(Debug)]
 pub struct Lookups {
+    /// Where, and over what.
     pub lookups: Vec<Lookup>,
+    /// The same as lanes take them.
     pub requests: Vec<Request>,
 }
 
-/// All images; without the photograph where nobody said where it is.
+/// The folder of real files, if there is one.
+pub fn data() -> Option<PathBuf> {
+    std::env::var_os(DATA).filter(|value| !value.is_empty()).map(PathBuf::from)
+}
+
+/// All images; without the photograph where it is not in the folder of real files.
 ///
 /// # Errors
 /// If its file cannot be read.
-pub fn all() -> anyhow::Result<Vec<Subject>> {
+pub fn all(data: Option<&Path>) -> anyhow::Result<Vec<Subject>> {
     let mut images = Vec::new();
-    if let Some(photograph) = photograph()? {
+    if let Some(photograph) = photograph(data)? {
         images.push(Subject::new("photograph", photograph));
     }
     images.push(Subject::new("checkerboard", Image::checkerboard(1024, 16)));
@@ -49,9 +62,10 @@ pub fn skipped() -> String {
 }
 
 /// `textures/astronaut.png` of the real files, in linear light.
-fn photograph() -> anyhow::Result<Option<Image>> {
-    let Some(folder) = std::env::var_os(DATA).map(PathBuf::from) else { return Ok(None) };
-    let file = std::fs::File::open(folder.join("textures/astronaut.png")).context("a real file")?;
+fn photograph(data: Option<&Path>) -> anyhow::Result<Option<Image>> {
+    let path = data.map(|folder| folder.join("textures/astronaut.png"));
+    let Some(path) = path.filter(|path| path.exists()) else { return Ok(None) };
+    let file = std::fs::File::open(path).context("a real file")?;
     let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info()?;
     let mut bytes = vec![0; reader.output_buffer_size().context("an image that fits the memory")?];
     let info = reader.next_frame(&mut bytes)?;
