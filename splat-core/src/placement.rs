@@ -83,6 +83,7 @@ impl Cloud {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SphericalHarmonics;
     use approx::assert_relative_eq;
 
     fn disc() -> Cloud {
@@ -117,6 +118,18 @@ mod tests {
         assert!(Vec3::from(covariance).abs_diff_eq(Vec3::new(1.0, 0.25, 0.0), 1e-6));
         assert_relative_eq!(cloud.areas.as_ref().unwrap()[0], 4.0, max_relative = 1e-6);
         assert_eq!(cloud.normals[0], Vec3::Z);
+    }
+
+    #[test]
+    fn colours_by_direction_go_along_once() {
+        let mut cloud = disc();
+        let terms = vec![Vec3::ZERO, Vec3::ZERO, Vec3::ONE, Vec3::ZERO];
+        cloud.harmonics = Some(SphericalHarmonics::new(1, terms).unwrap());
+        let before = cloud.harmonics.as_ref().unwrap().color(0, Vec3::Z);
+        let turn = DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        cloud.place(&DAffine3::from_mat3(turn));
+        let after = cloud.harmonics.as_ref().unwrap().color(0, (turn * DVec3::Z).as_vec3());
+        assert_relative_eq!(after[0], before[0], max_relative = 1e-6);
     }
 
     #[test]

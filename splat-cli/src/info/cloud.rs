@@ -219,7 +219,12 @@ impl fmt::Display for Summary {
         writeln!(f, "format       {}, {} bytes", self.format, self.bytes)?;
         writeln!(f, "sha256       {}", self.sha256)?;
         for element in &self.elements {
-            let role = if element.is_points { "the points" } else { "not used" };
+            let is_used = element.properties.iter().any(|property| property.is_used);
+            let role = match element.is_points {
+                true => "the points",
+                false if is_used => "used with the points",
+                false => "not used",
+            };
             writeln!(f, "element      {}: {} rows, {role}", element.name, element.count)?;
             for property in element.properties.iter().filter(|property| element.is_points || property.is_used)
             {

@@ -37,8 +37,12 @@ pub(crate) const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// The first bytes of the header.
 pub(crate) const MAGIC: &[u8] = b"NGSP";
 
-/// How many times as large as its file the data may be: the most that gzip can do. Claims beyond that are refused.
-const MOST_RATIO: u64 = 1032;
+/// How many times as large as its file the data may be, beyond the first [`FREE_BYTES`]: far more than what is trained shrinks
+/// by, and a tenth of what gzip can do. Claims beyond that are refused.
+const MOST_RATIO: u64 = 100;
+
+/// Data of this size are accepted from a file of any size.
+const FREE_BYTES: u64 = 1 << 20;
 
 /// Size of the header of version 2 and 3, in bytes, and the first part of that of version 4.
 const HEADER_BYTES: usize = 16;
@@ -230,7 +234,7 @@ impl<'a> File<'a> {
             return Err(self.too_many(header.count, "4294967294 splats"));
         }
         let claimed: u64 = header.sizes().iter().sum();
-        let most = MOST_RATIO * self.bytes.len() as u64;
+        let most = FREE_BYTES + MOST_RATIO * self.bytes.len() as u64;
         if claimed > most {
             let found = format!("{count} splats, {claimed} bytes");
             let expected = format!("at most {most} bytes from a file of {}", self.bytes.len());

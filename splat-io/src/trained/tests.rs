@@ -124,8 +124,8 @@ fn claims_of_spz_files_are_held_against_the_file() {
     // Many splats in a small file: refused before anything is unpacked.
     let claim = message(&gzip(&spz_header(3, 4_000_000_000, 3)));
     assert!(claim.contains("4000000000 splats, 260000000000 bytes, expected at most"), "{claim}");
-    assert!(message(&spz_header(3, 1000, 0)).contains("expected at most 16512 bytes"));
-    assert!(message(&spz_header(4, 1000, 0)).contains("expected at most 16512 bytes"));
+    assert!(message(&spz_header(3, 100_000, 0)).contains("expected at most 1050176 bytes"));
+    assert!(message(&spz_header(4, 100_000, 0)).contains("expected at most 1050176 bytes"));
     // A bomb: a megabyte of zeros behind one splat.
     let bomb = [spz_header(3, 1, 0), vec![0; 1 << 20]].concat();
     assert!(message(&gzip(&bomb)).contains("more data than the splats have"));
