@@ -92,7 +92,7 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
         assumptions.push("areas are estimated from neighbours".to_owned());
     }
     if cloud.colors.is_none() {
-        assumptions.push("there is no colour: a headlight shades the surfaces (--shading)".to_owned());
+        assumptions.push("there is no colour: a headlight shades the surfaces (--shading; edl shows more of terrain and trees)".to_owned());
     }
     assumptions
 }

@@ -132,7 +132,13 @@ fn bare_points(centre: DVec3) -> Cloud {
     let sphere = sphere(centre);
     let points: Vec<DVec3> = (0..2000)
         .map(|i| (i, sphere.world_position(i)))
-        .map(|(i, p)| if i == 77 { centre + 9.0 * DVec3::X } else { centre + (p - centre) * (1.0 + 1e-3 * (i % 7) as f64) })
+        .map(|(i, p)| {
+            if i == 77 {
+                centre + 9.0 * DVec3::X
+            } else {
+                centre + (p - centre) * (1.0 + 1e-3 * (i % 7) as f64)
+            }
+        })
         .collect();
     Cloud::from_points(&points)
 }
@@ -143,7 +149,9 @@ fn a_prepared_cloud_is_the_same_picture() {
     let shift = DVec3::new(500_000.0, 5_000_000.0, 100.0);
     for (name, at) in [("near", DVec3::ZERO), ("far", shift)] {
         write_ply(&folder.path().join(format!("{name}.ply")), &bare_points(at), PlyEncoding::Binary).unwrap();
-        for options in ["", "--orient graph --outliers statistical --radius-scale 1.2", "--orient up --radius 0.1"] {
+        for options in
+            ["", "--orient graph --outliers statistical --radius-scale 1.2", "--orient up --radius 0.1"]
+        {
             let size = "--size 200x150 --spp 4";
             succeeds(folder.path(), &format!("render {name}.ply -o raw.png {size} {options}"));
             succeeds(folder.path(), &format!("prepare {name}.ply -o once.ply {options}"));
@@ -174,7 +182,10 @@ fn a_crop_of_a_shaded_picture_is_a_part_of_it() {
     assert_eq!((width, height), (60, 60));
     let at = |x: u32, y: u32| whole[((y + 30) * 160 + x + 40) as usize];
     assert!((0..60).all(|y| (0..60).all(|x| part[(y * 60 + x) as usize] == at(x, y))));
-    succeeds(folder.path(), "render in.ply --size 160x120 --spp 4 --background 0,0,1 -o plain.png --shading headlight");
+    succeeds(
+        folder.path(),
+        "render in.ply --size 160x120 --spp 4 --background 0,0,1 -o plain.png --shading headlight",
+    );
     let (_, _, plain) = read_png(&folder.path().join("plain.png"));
     assert!(plain.iter().zip(&whole).any(|(a, b)| a != b) && plain[0] == whole[0]);
     for wrong in ["--shading edl --samples 0:2", "--shading edl --resolve over", "--edl-strength 2"] {
