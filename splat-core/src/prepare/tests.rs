@@ -171,7 +171,8 @@ fn weight(cloud: &Cloud, place: DVec3, options: &PrepareOptions) -> f64 {
     let one = |index: usize| {
         let offset = place - cloud.world_position(index);
         let axes = axes[index].map(|axis| axis.as_dvec3());
-        let r2: f64 = axes.iter().map(|axis| (offset.dot(*axis) / axis.length_squared()).powi(2)).sum();
+        let uv = axes.map(|axis| offset.dot(axis) / axis.length_squared());
+        let r2 = uv[0] * uv[0] + uv[1] * uv[1];
         let extent = axes[0].length() * axes[1].length() * options.kernel.integral(options.cutoff);
         f64::from(areas[index]) * options.kernel.value(r2, options.cutoff) / extent
     };
