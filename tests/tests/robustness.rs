@@ -62,6 +62,7 @@ fn cloud(number: impl Strategy<Value = f32> + Clone + 'static) -> impl Strategy<
             areas,
             texture_coordinates: None,
             oriented,
+            outliers: None,
         })
 }
 
