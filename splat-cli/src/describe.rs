@@ -105,7 +105,10 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
     assumptions.extend(match default_choice(cloud) {
         Some(ColorChoice::Rgb) => None,
         Some(_) => Some("there is no colour: the intensity is shown (--color)".to_owned()),
-        None => Some("there is no colour: a headlight shades the surfaces (--shading)".to_owned()),
+        None => Some(
+            "there is no colour: a headlight shades the surfaces (--shading; edl shows more of terrain and trees)"
+                .to_owned(),
+        ),
     });
     assumptions
 }

@@ -211,25 +211,9 @@ impl Cloud {
 
     /// Takes the marked outliers out, so that what follows them moves up.
     pub fn remove_outliers(&mut self) {
-        fn retain<T>(values: &mut Vec<T>, outliers: &[bool]) {
-            let mut outliers = outliers.iter();
-            values.retain(|_| !outliers.next().is_some_and(|&outlier| outlier));
-        }
-        let Some(outliers) = self.outliers.take() else { return };
-        retain(&mut self.positions, &outliers);
-        retain(&mut self.normals, &outliers);
-        match &mut self.shapes {
-            Shapes::Discs(sizes) => retain(sizes, &outliers),
-            Shapes::Ellipses(axes) => retain(axes, &outliers),
-        }
-        if let Some(colors) = &mut self.colors {
-            retain(colors, &outliers);
-        }
-        for values in [&mut self.opacities, &mut self.areas].into_iter().flatten() {
-            retain(values, &outliers);
-        }
-        if let Some(coordinates) = &mut self.texture_coordinates {
-            retain(coordinates, &outliers);
+        if let Some(outliers) = self.outliers.take() {
+            let kept: Vec<usize> = (0..self.len()).filter(|&index| !outliers[index]).collect();
+            *self = self.only(&kept);
         }
     }
 

@@ -54,9 +54,6 @@ impl Cloud {
         for normal in &mut self.normals {
             *normal = (cofactors * normal.as_dvec3()).normalize_or_zero().as_vec3();
         }
-        if let Some(harmonics) = &mut self.harmonics {
-            harmonics.turn(&linear);
-        }
         match (&mut self.shapes, scale) {
             (Shapes::Discs(sizes), Some(scale)) => sizes.iter_mut().for_each(|size| *size *= scale as f32),
             (Shapes::Discs(_), None) => {}

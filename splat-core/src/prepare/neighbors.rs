@@ -19,6 +19,7 @@ pub struct Neighbors {
     members: Vec<u32>,
     /// Where the members of each place start, and the number of all at the end.
     starts: Vec<u32>,
+    /// Of the places as [`turned`] has them.
     tree: Option<ImmutableKdTree<f64, 3>>,
 }
 
@@ -40,7 +41,8 @@ impl Neighbors {
         }
         starts.push(members.len() as u32);
         // No tree of no points; the constructor's only other failure is a count beyond its index type.
-        let tree = if places.is_empty() { None } else { ImmutableKdTree::new_from_slice(&places).ok() };
+        let turned: Vec<[f64; 3]> = places.iter().map(|&place| turned(place)).collect();
+        let tree = if places.is_empty() { None } else { ImmutableKdTree::new_from_slice(&turned).ok() };
         Self { places, members, starts, tree }
     }
 
@@ -71,16 +73,19 @@ impl Neighbors {
         else {
             return Vec::new();
         };
-        let found = tree.query(&self.places[place]).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
+        let found =
+            tree.query(&turned(self.places[place])).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
         let others = found.into_iter().map(|found| found.item as usize);
         others.filter(|&other| other != place).take(count).collect()
     }
 
-    /// The places within `radius` of a place, itself among them, in no useful order.
+    /// The places within `radius` of a place, itself among them, in no useful order; and perhaps some that are farther by
+    /// rounding.
     pub fn within(&self, place: usize, radius: f64) -> impl Iterator<Item = usize> {
         let found = self.tree.as_ref().map(|tree| {
-            let query = tree.query(&self.places[place]);
-            query.within::<SquaredEuclidean<f64>>(radius * radius).unsorted().execute()
+            let centre = turned(self.places[place]);
+            let query = tree.query(&centre);
+            query.within::<SquaredEuclidean<f64>>(radius * radius * (1.0 + ROUNDING)).unsorted().execute()
         });
         found.into_iter().flatten().map(|neighbor| neighbor.item as usize)
     }
@@ -104,6 +109,17 @@ impl Neighbors {
         let len = self.len();
         (0..len).step_by(BLOCK).map(move |start| start..(start + BLOCK).min(len))
     }
+}
+
+/// Relative error, much exaggerated, of squared distances between turned places.
+const ROUNDING: f64 = 1e-9;
+
+/// A place in axes that are turned against those of the scene. Else walls, floors and water would lie in one plane of the
+/// tree's axes, in which it could not split them: searches took four times as long.
+fn turned(place: [f64; 3]) -> [f64; 3] {
+    // An orthogonal matrix of rational numbers.
+    let [x, y, z] = place.map(|value| value / 7.0);
+    [2.0 * x + 3.0 * y + 6.0 * z, 3.0 * x - 6.0 * y + 2.0 * z, 6.0 * x + 2.0 * y - 3.0 * z]
 }
 
 /// The indices of a cloud's finite points that are no outliers, along a Morton curve; what it leaves together is sorted by
