@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 pub struct Times(Vec<f64>);
 
 /// What takes less is timed [`MORE`] times a turn: its times are the noisiest, and cost the least.
-const SHORT: Duration = Duration::from_millis(20);
+const SHORT: Duration = Duration::from_millis(10);
 const MORE: usize = 4;
 
 impl Times {

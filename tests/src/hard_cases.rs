@@ -344,7 +344,7 @@ fn truth_of_sample(
     let hit = (r2 < view.cutoff && depth > view.near).then(|| Found { weight: libm::exp(-0.5 * r2), depth });
     let from_near = (depth - view.near).abs();
     // A threshold a hundredth larger: in between rounding decides.
-    let with = SplatConstants { edge_on: 1.01 * edge_on, ..constants.clone() };
+    let with = SplatConstants { edge_on: 1.01 * edge_on, ..*constants };
     Some(Truth {
         hit,
         certain: (r2 - view.cutoff).abs() > membership

@@ -2,6 +2,8 @@
 //! to tell apart, and sums of very many or very light fragments. `cargo test -p splat-tests --test hard_cases -- --nocapture`
 //! prints what is measured.
 
+#![expect(clippy::print_stdout, reason = "what is measured, for whoever asks for it")]
+
 use splat_abuffer::Thickness;
 use splat_core::render;
 use splat_simd::{Level, Renderer};

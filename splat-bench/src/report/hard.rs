@@ -34,7 +34,7 @@ pub fn section(context: &mut Context) -> anyhow::Result<Section> {
 }
 
 fn single_splats(section: &mut Section, context: &mut Context) {
-    let count = if context.quick { 6 } else { 50 };
+    let count = if context.quick { 3 } else { 50 };
     section.heading("Single splats");
     section.text(format!(
         "{count} random splats of each kind (more of tiny ones), gaussian, F = 2, {SAMPLES} samples a pixel, against the evaluation in f64 of every sample of the frame. \

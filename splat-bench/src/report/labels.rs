@@ -4,7 +4,7 @@ use super::plot::{escape, write_line};
 
 /// Size of the letters, and about how wide one is.
 const HEIGHT: f64 = 9.0;
-const LETTER: f64 = 5.2;
+const LETTER: f64 = 5.6;
 
 /// How far from its point a text may be, in the order in which it is tried.
 const DISTANCES: [f64; 4] = [5.0, 12.0, 22.0, 34.0];

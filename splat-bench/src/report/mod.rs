@@ -156,7 +156,7 @@ pub fn run(choices: &Choices) -> anyhow::Result<()> {
     if let Some(readme) = readme {
         let quick = if quick { " --quick" } else { "" };
         let made = format!(
-            "Frames of {} x {} on one thread: milliseconds, RMSE and FLIP against pictures in `f64` of 1058 samples, by samples a pixel (spp), \
+            "Frames of {} x {} on one thread: milliseconds, and the RMSE against pictures in `f64` of 1058 samples, by samples a pixel (spp), \
              everything else at its default. Made by `cargo run --release -p splat-bench -- report{quick} --readme README.md` on {machine}.",
             context.width,
             context.width * 9 / 16,

@@ -68,7 +68,7 @@ impl Plot {
         self.write_axes(&mut svg, ranges, place);
         let mut labels = Labels { area: FRAME, ..Labels::default() };
         for (number, series) in self.series.iter().enumerate() {
-            let color = COLORS[number % COLORS.len()];
+            let color = if series.rings { "#000000" } else { COLORS[number % COLORS.len()] };
             let mark = if series.rings {
                 format!("r=\"5\" fill=\"none\" stroke=\"{color}\"")
             } else {
