@@ -115,7 +115,8 @@ mod tests {
             let truth = grid.count() as f64 / 4096.0;
             for pattern in patterns.chunks(samples) {
                 let count = pattern.iter().filter(|p| inside(f64::from(p[0]), f64::from(p[1]))).count();
-                sum += (count as f64 / samples as f64 - truth).powi(2);
+                let error = count as f64 / samples as f64 - truth;
+                sum += error * error;
             }
         }
         sum / f64::from(edges) / (patterns.len() / samples) as f64
@@ -132,6 +133,21 @@ mod tests {
             let dealt = patterns(samples, place, &mut generator(9));
             let ratio = (edge_error(&separate, samples) / edge_error(&dealt, samples)).sqrt();
             assert!(ratio > least, "{samples}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn each_sample_is_anywhere() {
+        // The mean place of a sample over all patterns: 1/2 within five deviations, 1/sqrt(12 n). In the net's own order the
+        // first sample of every pattern is in the same strip.
+        let samples = 8;
+        let points = patterns(samples, |point| point.map(|value| value as f32), &mut generator(4));
+        for sample in 0..samples {
+            for axis in 0..2 {
+                let values = points.iter().skip(sample).step_by(samples).map(|point| f64::from(point[axis]));
+                let mean = values.sum::<f64>() / PATTERNS as f64;
+                assert!((mean - 0.5).abs() < 5.0 / (12.0 * PATTERNS as f64).sqrt(), "{sample}: {mean}");
+            }
         }
     }
 
