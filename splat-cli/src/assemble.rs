@@ -9,7 +9,6 @@ use crate::scene::{self, Source};
 use crate::statistics::Times;
 use crate::{colors, describe, prepare as preparation, resolve};
 use anyhow::Context;
-use splat_abuffer::Resolve;
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Cloud, Material, Materials, RenderOptions};
@@ -98,12 +97,8 @@ fn read(
 
 /// What the estimates of a cloud depend on.
 fn estimates(arguments: &RenderArguments, options: &RenderOptions, up: Up) -> PrepareOptions {
-    PrepareOptions {
-        kernel: options.kernel,
-        cutoff: options.cutoff,
-        areas: options.resolve != Resolve::Over,
-        ..arguments.preparation.options(up)
-    }
+    let PrepareOptions { kernel, cutoff, areas, .. } = PrepareOptions::for_picture(options);
+    PrepareOptions { kernel, cutoff, areas, ..arguments.preparation.options(up) }
 }
 
 /// A cloud, what it is made of, and what is shown as its colour.

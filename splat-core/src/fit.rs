@@ -47,6 +47,13 @@ pub struct Framing {
     pub orthographic: bool,
 }
 
+impl Default for Framing {
+    /// The three-quarter view, 1280 x 960, y up.
+    fn default() -> Self {
+        Self { width: 1280, height: 960, up: Up::Y, azimuth: 30.0, elevation: 20.0, orthographic: false }
+    }
+}
+
 /// Field of view along the picture's longer side, in degrees: that of a 55 mm lens on a full-frame camera.
 pub const FIELD_OF_VIEW: f64 = 36.0;
 

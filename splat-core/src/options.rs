@@ -3,7 +3,7 @@
 use crate::kernel::{Kernel, TableMode};
 use crate::sampling::{PatternKind, PixelFilter};
 use crate::shade::Optics;
-use crate::{AovSelection, Error, Materials, PixelRect};
+use crate::{AovSelection, Cloud, Error, Materials, PixelRect};
 use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use std::ops::Range;
@@ -90,6 +90,17 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
+    /// What suits a cloud: trained splats are blended one by one, surfels without a colour are lit from the eye, all else
+    /// is as by default.
+    pub fn suited_to(cloud: &Cloud) -> Self {
+        if cloud.trained {
+            return Self { resolve: Resolve::Over, kernel: Kernel::Gaussian, cutoff: 9.0, ..Self::default() };
+        }
+        let has_colors = cloud.colors.is_some() || cloud.harmonics.is_some();
+        let shading = if has_colors { Shading::Color } else { Shading::Headlight };
+        Self { shading, ..Self::default() }
+    }
+
     /// The samples that are taken.
     pub fn sample_range(&self) -> Range<u32> {
         self.sample_range.clone().unwrap_or(0..self.samples)

@@ -15,10 +15,11 @@ mod tests;
 pub use orientation::Orientation;
 pub use outlier::Outliers;
 
-use crate::{Cloud, Kernel, Shapes};
+use crate::{Cloud, Kernel, RenderOptions, Shapes};
 use glam::{Vec2, Vec3};
 use local::Local;
 use neighbors::Neighbors;
+use splat_abuffer::Resolve;
 
 /// What the estimates depend on. The default is what `surface` wants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +57,14 @@ impl Default for PrepareOptions {
             size_scale: 1.0,
             outliers: Outliers::default(),
         }
+    }
+}
+
+impl PrepareOptions {
+    /// What a picture with these options needs.
+    pub fn for_picture(options: &RenderOptions) -> Self {
+        let areas = options.resolve != Resolve::Over;
+        Self { kernel: options.kernel, cutoff: options.cutoff, areas, ..Self::default() }
     }
 }
 
