@@ -13,6 +13,7 @@ use crate::scene::Scene;
 use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
 use clap::{Args, Parser, Subcommand};
 use splat_core::{AovSelection, PixelRect};
+use std::ffi::OsString;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -140,9 +141,9 @@ pub struct RenderArguments {
     /// as one; or a scene file (.toml)
     #[arg(required = true, value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// The picture: .exr (linear, all AOVs) or .png
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    /// The picture: .exr (linear, all AOVs) or .png [default: the input's name with .png, here]
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: Option<PathBuf>,
     /// Print a scene file that means this command line instead of rendering it
     #[arg(long, help_heading = "Program")]
     pub print_config: bool,
@@ -173,6 +174,16 @@ pub struct RenderArguments {
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
+}
+
+impl RenderArguments {
+    /// The picture: as named, or else after the first input.
+    pub fn picture(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| {
+            let stem = self.inputs.first().and_then(|input| input.file_stem()).unwrap_or("picture".as_ref());
+            [stem, ".png".as_ref()].into_iter().collect::<OsString>().into()
+        })
+    }
 }
 
 /// The camera: from a file, or fitted to the cloud.

@@ -91,7 +91,7 @@ pub struct Shot {
 /// What the reader of cameras says; [`UsageError`] for a choice that cannot be followed, and two pictures of one name.
 pub fn plan(arguments: &RenderArguments, near: f64, console: Console) -> anyhow::Result<Vec<Shot>> {
     let FrameArguments { camera_name, frames, turntable, .. } = &arguments.camera.frames;
-    let output = &arguments.output;
+    let output = &arguments.picture();
     let shots = if let Some(path) = &arguments.camera.camera {
         let set = cameras::read(path, &arguments.camera, near, console)?;
         let chosen = choose(&set, camera_name.as_deref(), frames.as_ref(), has_place_holder(output))?;

@@ -8,6 +8,7 @@ use crate::console::Console;
 use crate::engine::Engine;
 use crate::progress::Progress;
 use crate::statistics::{self, Report, Times, is_stdout};
+use crate::usage::UsageError;
 use crate::values::ViewDirection;
 use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
@@ -24,7 +25,12 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let options = resolve::options(arguments, false)?;
-    output::check_picture(&arguments.output, options.aovs, arguments.outputs.aov_files)?;
+    let picture = arguments.picture();
+    if arguments.output.is_none() && picture.exists() {
+        let message = format!("{} exists: name the picture with -o", picture.display());
+        return Err(UsageError::new(message).into());
+    }
+    output::check_picture(&picture, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
     }

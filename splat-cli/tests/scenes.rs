@@ -1,0 +1,164 @@
+//! Scene files from outside: what they say is drawn, the command line wins, and what is wrong is said with its line.
+
+use glam::{DVec3, Vec3};
+use splat_core::{Cloud, Shapes};
+use splat_io::{PlyEncoding, write_ply};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn splat(folder: &Path, arguments: &str) -> Output {
+    let program = env!("CARGO_BIN_EXE_splat");
+    Command::new(program).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+/// What the program wrote to stdout; it must succeed.
+fn stdout(folder: &Path, arguments: &str) -> String {
+    let output = splat(folder, arguments);
+    assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The message of a program that must fail.
+fn failure(folder: &Path, arguments: &str) -> String {
+    let output = splat(folder, arguments);
+    assert!(!output.status.success(), "{arguments}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Size and RGBA bytes of a small picture of these inputs.
+fn picture(folder: &Path, arguments: &str) -> ([u32; 2], Vec<u8>) {
+    stdout(folder, &format!("render {arguments} -o out.png --quiet"));
+    let file = fs::File::open(folder.join("out.png")).unwrap();
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    decoder.set_transformations(png::Transformations::ALPHA);
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    ([info.width, info.height], bytes[..info.buffer_size()].to_vec())
+}
+
+/// A square of discs in the plane z = 0 around a place, of one colour.
+fn square(at: DVec3, color: Vec3) -> Cloud {
+    let points: Vec<DVec3> =
+        (0..400).map(|i| at + DVec3::new(f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5, 0.0)).collect();
+    Cloud {
+        normals: vec![Vec3::Z; 400],
+        shapes: Shapes::Discs(vec![0.9; 400]),
+        colors: Some(vec![color; 400]),
+        oriented: true,
+        ..Cloud::from_points(&points)
+    }
+}
+
+/// A folder with a red square, `red.ply`, and one without normals, sizes and colours, `bare.xyz`.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let red = square(DVec3::ZERO, Vec3::new(1.0, 0.0, 0.0));
+    write_ply(&folder.path().join("red.ply"), &red, PlyEncoding::Binary).unwrap();
+    let rows = (0..400).map(|i| format!("{} {} 0\n", f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5));
+    fs::write(folder.path().join("bare.xyz"), rows.collect::<String>()).unwrap();
+    folder
+}
+
+const SMALL: &str = "--size 80x60 --spp 4";
+
+#[test]
+fn a_scene_says_what_a_command_line_says() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::create_dir(folder.join("scenes")).unwrap();
+    let scene = "[[cloud]]\npath = \"../red.ply\"\n[camera]\nview = \"20,-10\"\nup = \"-y\"\n\
+                 [lens]\nlens-radius = 0.5\nfocus = 30\n[film]\nsize = \"80x60\"\nspp = 4\n\
+                 background = [0, 0.25, 1]\n[splats]\ncull = false\n[light]\nshading = \"headlight\"\n";
+    fs::write(folder.join("scenes/s.toml"), scene).unwrap();
+    let line = "--view 20,-10 --up=-y --lens-radius 0.5 --focus 30 --background 0,0.25,1 --shading headlight";
+    let expected = picture(folder, &format!("red.ply {line} {SMALL}"));
+    assert_eq!(picture(folder, "scenes/s.toml"), expected);
+    // What the command line says wins, and so does what contradicts the file.
+    let other = picture(folder, &format!("red.ply {line} --spp 4 --size 40x30"));
+    assert_eq!(picture(folder, "scenes/s.toml --size 40x30"), other);
+    let flat = "--view 20,-10 --up=-y --background 0,0.25,1 --shading headlight --ortho";
+    let flat = picture(folder, &format!("red.ply {flat} {SMALL}"));
+    assert_eq!(picture(folder, "scenes/s.toml --ortho"), flat);
+}
+
+#[test]
+fn what_is_printed_means_the_same() {
+    let folder = folder();
+    let folder = folder.path();
+    let lines = [
+        format!("red.ply {SMALL}"),
+        format!("red.ply bare.xyz {SMALL} --view=-30,10 --ortho --filter tent --kernel gaussian --cutoff 5"),
+        format!("bare.xyz {SMALL} --color height --colormap inferno --normals-k 8 --exr-type float --cull"),
+    ];
+    for line in lines {
+        fs::write(folder.join("printed.toml"), stdout(folder, &format!("render {line} --print-config")))
+            .unwrap();
+        assert_eq!(picture(folder, "printed.toml"), picture(folder, &line), "{line}");
+        let again = stdout(folder, "render printed.toml --print-config");
+        assert_eq!(again, fs::read_to_string(folder.join("printed.toml")).unwrap(), "{line}");
+    }
+}
+
+#[test]
+fn clouds_have_places_and_looks_of_their_own() {
+    let folder = folder();
+    let folder = folder.path();
+    let film = "[film]\nsize = \"80x60\"\nspp = 4\n[camera]\northo = \"front\"\n";
+    // The red square at the left; at the right one without normals and sizes, coloured by its height.
+    let scene = "[[cloud]]\npath = \"red.ply\"\ntranslate = [-15, 0, 0]\n\
+                 [[cloud]]\npath = \"bare.xyz\"\ntranslate = [15, 0, 0]\ncolor = \"height\"\nopacity = 0.5\n";
+    fs::write(folder.join("s.toml"), format!("{scene}{film}")).unwrap();
+    let ([width, height], pixels) = picture(folder, "s.toml");
+    let at = |x: u32, y: u32| -> [u8; 4] {
+        let index = 4 * (y * width + x) as usize;
+        pixels[index..index + 4].try_into().unwrap()
+    };
+    assert_eq!(at(width / 4, height / 2), [255, 0, 0, 255]);
+    assert_eq!(at(width / 2, height / 2)[3], 0, "a gap");
+    let right = at(3 * width / 4, height / 2);
+    assert!((126..=130).contains(&right[3]), "half transparent: {right:?}");
+    let [above, below] = [at(3 * width / 4, height * 9 / 20), at(3 * width / 4, height * 11 / 20)];
+    assert!(above[1] > below[1], "viridis is greener above: {above:?} {below:?}");
+
+    // Turned by a quarter it is seen from its side, which is nothing.
+    let turned =
+        "[[cloud]]\npath = \"red.ply\"\n[[cloud]]\npath = \"red.ply\"\nrotate = [0, 90, 0]\nscale = 0.5\n";
+    fs::write(folder.join("s.toml"), format!("{turned}{film}")).unwrap();
+    let alone = picture(folder, &format!("red.ply --ortho front {SMALL}"));
+    assert_eq!(picture(folder, "s.toml"), alone);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_line() {
+    let folder = folder();
+    let folder = folder.path();
+    let wrong = [
+        ("[film]\nspq = 4\n", "s.toml: line 2: found `spq`, expected one of"),
+        ("[camera]\nspp = 4\n", "line 2: found `spp` in [camera], expected it in [film]"),
+        ("[cinema]\nspp = 4\n", "line 1: found [cinema], expected one of [[cloud]]"),
+        ("[film]\nspp = \"many\"\n", "invalid value 'many'"),
+        ("[film]\nspp = true\n", "line 2: found spp = true, expected a value"),
+        ("[splats]\ncull = 1\n", "line 2: found cull = 1, expected true or false"),
+        ("[[cloud]]\npath = \"red.ply\"\nhue = 3\n", "line 3: found `hue`, expected path, translate"),
+        ("[[cloud]]\npath = \"none.ply\"\n", "none.ply: cannot open"),
+    ];
+    for (scene, message) in wrong {
+        fs::write(folder.join("s.toml"), scene).unwrap();
+        let said = failure(folder, "render s.toml -o out.png");
+        assert!(said.contains(message), "{scene:?}: {said}");
+    }
+    fs::write(folder.join("s.toml"), "").unwrap();
+    assert!(failure(folder, "render s.toml s.toml -o o.png").contains("one scene file at a time"));
+}
+
+#[test]
+fn a_picture_needs_no_name_and_destroys_nothing() {
+    let folder = folder();
+    let folder = folder.path();
+    stdout(folder, &format!("render red.ply {SMALL} --quiet"));
+    assert!(folder.join("red.png").exists());
+    let said = failure(folder, &format!("render red.ply {SMALL}"));
+    assert!(said.contains("red.png exists: name the picture with -o"), "{said}");
+}
