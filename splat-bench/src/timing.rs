@@ -1,5 +1,6 @@
 //! Times: the least of several repetitions, all that is compared taking turns.
 
+use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// The times of something, in milliseconds.
@@ -23,8 +24,10 @@ impl Times {
     }
 
     fn once<T>(&mut self, work: &mut impl FnMut() -> T) -> T {
+        // Lest the compiler sees that it is the same work again, and does it once.
+        let work = black_box(work);
         let start = Instant::now();
-        let result = work();
+        let result = black_box(work());
         self.add(start.elapsed());
         result
     }

@@ -29,7 +29,7 @@ const SAMPLES: [u32; 9] = [1, 2, 4, 6, 8, 16, 32, 64, 128];
 /// If something cannot be rendered.
 pub fn section(context: &mut Context) -> anyhow::Result<Section> {
     let mut section = Section::new("Convergence: error against samples");
-    let seeds = if context.quick { 3 } else { 16 };
+    let seeds = if context.quick { 3 } else { 12 };
     section.text(format!(
         "RMSE over all pixels and {seeds} seeds, against the truth of the same filter. Slopes are fitted from 4 samples on. Without any order in the samples the slope is -0.5."
     ));
