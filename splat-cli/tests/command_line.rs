@@ -235,7 +235,7 @@ fn trained_splats_have_defaults_of_their_own() {
 
     fs::write(folder.path().join("a.ksplat"), [0; 5000]).unwrap();
     assert!(fails(folder.path(), "render a.ksplat -o out.png", 1).contains(".ksplat is not supported"));
-    assert!(fails(folder.path(), "convert in.ply -o out.spz", 2).contains(".ply or .splat"));
+    assert!(fails(folder.path(), "convert in.ply -o out.spz", 2).contains("one of .ply, .las"));
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn exit_codes_and_messages_tell_who_is_to_blame() {
     .unwrap();
     write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Ascii).unwrap();
     let usage = [
-        "render in.ply",
+        "render",
         "render in.ply -o out.jpg",
         "render in.ply -o out.png --spp none",
         "render in.ply -o out.png --aov depth",

@@ -273,17 +273,10 @@ fn transparency() -> Scene {
         ..RenderOptions::default()
     };
     let center = DVec3::new(0.05, -0.1, 4.0);
-    let mut cloud = sphere(center, 1.6, 400, &options);
+    let outer = sphere(center, 1.6, 400, &options);
     let inner = sphere(center + DVec3::new(0.3, 0.2, 0.2), 0.7, 150, &options);
-    let counts = [cloud.len(), inner.len()];
-    cloud.positions.extend(inner.positions.iter().map(|&p| p + (inner.origin - cloud.origin).as_vec3()));
-    cloud.normals.extend(inner.normals);
-    if let (Shapes::Discs(sizes), Shapes::Discs(more)) = (&mut cloud.shapes, &inner.shapes) {
-        sizes.extend(more);
-    }
-    if let (Some(areas), Some(more)) = (&mut cloud.areas, inner.areas) {
-        areas.extend(more);
-    }
+    let counts = [outer.len(), inner.len()];
+    let mut cloud = Cloud::join(vec![outer, inner]).expect("two spheres go together");
     let of_each = |outer, inner| [vec![outer; counts[0]], vec![inner; counts[1]]].concat();
     cloud.colors = Some(of_each(Vec3::new(0.9, 0.9, 0.6), Vec3::new(0.9, 0.2, 0.3)));
     cloud.opacities = Some([vec![0.35; counts[0]], vec![0.8; counts[1]]].concat());

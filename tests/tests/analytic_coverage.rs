@@ -231,8 +231,9 @@ fn the_weights_of_a_closed_surface_sum_to_one() {
             let spread = (weights.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / n).sqrt();
             let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
             let name = format!("{count} splats, {kernel:?}, F = {cutoff}");
-            let Shapes::Discs(sizes) = &cloud.shapes else { unreachable!("discs") };
-            let bound = tol::mean_weight(f64::from(sizes[count / 2]));
+            let Shapes::Ellipses(axes) = &cloud.shapes else { unreachable!("estimated sizes are ellipses") };
+            let [t1, t2] = axes[count / 2];
+            let bound = tol::mean_weight(f64::from(t1.cross(t2).length().sqrt()));
             assert!((mean - 1.0).abs() <= bound, "{name}: mean {mean}, bound {bound}");
             assert!(spread <= tol::SPREAD_OF_WEIGHT, "{name}: spread {spread}");
             let bound = 1.0 - bound - 4.0 * tol::SPREAD_OF_WEIGHT;

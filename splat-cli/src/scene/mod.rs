@@ -235,19 +235,20 @@ impl Scene {
     ) -> anyhow::Result<&'a Arg> {
         let (path, line, name) = (self.path.display(), setting.line, &setting.name);
         let options = || command.get_arguments().filter(|arg| table_of(arg).is_some());
+        let here = options().filter(|arg| table_of(arg).as_ref() == Some(&section.name));
+        let names: Vec<&str> = here.filter_map(Arg::get_long).collect();
+        if names.is_empty() {
+            let mut tables: Vec<String> = options().filter_map(table_of).collect();
+            tables.sort();
+            tables.dedup();
+            bail!(
+                "{path}: line {}: found [{}], expected one of [[cloud]], [{}]",
+                section.line,
+                section.name,
+                tables.join("], [")
+            );
+        }
         let Some(arg) = options().find(|arg| arg.get_long() == Some(name)) else {
-            let here = options().filter(|arg| table_of(arg).as_ref() == Some(&section.name));
-            let names: Vec<&str> = here.filter_map(Arg::get_long).collect();
-            if names.is_empty() {
-                let mut tables: Vec<String> = options().filter_map(table_of).collect();
-                tables.dedup();
-                bail!(
-                    "{path}: line {}: found [{}], expected one of [[cloud]], [{}]",
-                    section.line,
-                    section.name,
-                    tables.join("], [")
-                );
-            }
             bail!("{path}: line {line}: found `{name}`, expected one of {}", names.join(", "));
         };
         match table_of(arg) {

@@ -40,9 +40,12 @@ fn setting(arg: &Arg, matches: &ArgMatches, settled: &[(&str, String)]) -> Strin
     if is_flag {
         return format!("{name} = {}\n", matches.get_flag(id));
     }
-    let raw = matches.get_raw(id).map(|mut values| {
-        values.next().map(|value| value.to_string_lossy().into_owned()).unwrap_or_default()
-    });
+    let raw = match matches.get_raw(id).map(|mut values| values.next()) {
+        // It stands alone.
+        Some(None) => return format!("{name} = true\n"),
+        Some(Some(value)) => Some(value.to_string_lossy().into_owned()),
+        None => None,
+    };
     let known = settled.iter().find(|(known, _)| *known == name).map(|(_, value)| value.clone());
     match raw.or(known) {
         Some(value) => format!("{name} = {}\n", literal(&value)),
