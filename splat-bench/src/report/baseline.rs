@@ -25,6 +25,9 @@ const NEGLIGIBLE: f64 = 1e-12;
 /// The part of a run's times that are quieter than what counts as its noise.
 const QUIET: f64 = 0.9;
 
+/// With more noise than this, of both runs together, something else had the machine for whole repetitions, and no time is judged.
+const TOO_LOUD: f64 = 0.5;
+
 /// How much a time must move to be taken for changed.
 ///
 /// A time's own noise, how far the median of its repetitions is above the least, is made of few repetitions and often too small
@@ -43,9 +46,10 @@ impl Noise {
         Self { of_runs: runs.into_iter().map(of_run).sum() }
     }
 
-    /// How much a time of these noises may move, relative to itself.
-    fn tolerance(self, noises: [f64; 2]) -> f64 {
-        TIME.max(2.0 * noises.iter().sum::<f64>()).max(2.0 * self.of_runs)
+    /// How much a time of these noises may move, relative to itself. `None` if there is no telling.
+    fn tolerance(self, noises: [f64; 2]) -> Option<f64> {
+        let tolerance = TIME.max(2.0 * noises.iter().sum::<f64>()).max(2.0 * self.of_runs);
+        (self.of_runs <= TOO_LOUD).then_some(tolerance)
     }
 }
 
@@ -108,8 +112,8 @@ pub struct Changes {
     pub better: Vec<Change>,
     /// Figures that both runs have.
     pub compared: usize,
-    /// By how much a time that is itself quiet must have moved to be among them.
-    pub least_time: f64,
+    /// By how much a time that is itself quiet must have moved to be among them. `None` if no time was judged.
+    pub least_time: Option<f64>,
 }
 
 /// What moved beyond noise between two runs.
@@ -128,7 +132,10 @@ pub fn compare(before: &Run, now: &Run) -> anyhow::Result<Changes> {
         changes.compared += 1;
         let (tolerance, negligible) = match figure.kind {
             Kind::Plain => continue,
-            Kind::Time => (noise.tolerance([figure.noise, old.noise]), 0.0),
+            Kind::Time => match noise.tolerance([figure.noise, old.noise]) {
+                Some(tolerance) => (tolerance, 0.0),
+                None => continue,
+            },
             Kind::Memory => (MEMORY, LITTLE),
             Kind::Error => (ERROR, NEGLIGIBLE),
         };
@@ -166,10 +173,13 @@ impl Changes {
             format!("{title}: {}\n{}", changes.len(), lines.collect::<String>())
         };
         let (worse, better) = (list("slower or less accurate", &self.worse), list("better", &self.better));
-        let percent = 100.0 * self.least_time;
-        let noise = format!(
-            "by the noise of these runs a time counts as changed from {percent:.0} % on, or more where it is itself noisy"
-        );
+        let noise = match self.least_time {
+            Some(least) => format!(
+                "by the noise of these runs a time counts as changed from {:.0} % on, or more where it is itself noisy",
+                100.0 * least
+            ),
+            None => "too noisy for times to be judged: run again with nothing else on the machine".to_owned(),
+        };
         format!("{} figures compared; {noise}\n{worse}{better}", self.compared)
     }
 }
