@@ -7,8 +7,9 @@ use crate::material::{self, Images};
 use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
+use crate::usage::UsageError;
 use crate::{colors, describe, prepare as preparation, resolve};
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
 use splat_core::{Cloud, Material, Materials, RenderOptions};
@@ -50,6 +51,10 @@ pub fn assemble(
 ) -> anyhow::Result<Assembled> {
     let images = material::read(&arguments.material, console)?;
     let sources = scene::sources(arguments)?;
+    ensure!(
+        !sources.is_empty(),
+        UsageError::new("the scene file has no [[cloud]]: there is nothing to draw")
+    );
     let (read, time) = progress.stage("read", |update| read(sources, console, update));
     times.read = time;
     let (mut parts, reports) = read?;

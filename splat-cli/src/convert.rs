@@ -29,6 +29,7 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
         let message = format!("{}: expected a name that ends in one of {known}", path.display());
         return Err(UsageError::new(message).into());
     };
+    output::spare_inputs(path, &arguments.inputs)?;
     output::check_file(path)?;
 
     let sampling = Sampling { points: arguments.points, seed: arguments.seed };

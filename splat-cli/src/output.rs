@@ -4,7 +4,7 @@ use crate::usage::UsageError;
 use anyhow::bail;
 use splat_core::AovSelection;
 use splat_io::{AtomicFile, PictureFormat};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Checks that a picture with these AOVs, in files of their own if `separate`, can be written there.
 ///
@@ -35,6 +35,23 @@ pub fn check_file(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Checks that no input would be overwritten, by whatever name.
+///
+/// # Errors
+/// [`UsageError`] naming the input.
+pub fn spare_inputs<'a>(
+    path: &Path,
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<(), UsageError> {
+    let Ok(target) = path.canonicalize() else { return Ok(()) };
+    match inputs.into_iter().find(|input| input.canonicalize().is_ok_and(|input| input == target)) {
+        Some(input) => {
+            Err(UsageError::new(format!("{} would overwrite {}", path.display(), input.display())))
+        }
+        None => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,5 +69,23 @@ mod tests {
         let missing = check("no such folder/x.png", AovSelection::default()).unwrap_err();
         assert!(!missing.is::<UsageError>() && missing.to_string().contains("no such folder"), "{missing}");
         assert!(!folder.join("splat-check.png").exists());
+    }
+
+    #[test]
+    fn inputs_are_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let [input, other] = ["in.ply", "other.ply"].map(|name| folder.path().join(name));
+        std::fs::write(&input, "x").unwrap();
+        std::fs::write(&other, "x").unwrap();
+        let inputs = [other.clone(), input.clone()];
+        assert!(spare_inputs(&folder.path().join("new.ply"), &inputs).is_ok());
+        assert!(spare_inputs(&folder.path().join(".").join("in.ply"), &inputs).is_err());
+        #[cfg(unix)]
+        {
+            let link = folder.path().join("link.ply");
+            std::os::unix::fs::symlink(&other, &link).unwrap();
+            let refused = spare_inputs(&link, &inputs).unwrap_err().to_string();
+            assert!(refused.contains("would overwrite") && refused.contains("other.ply"), "{refused}");
+        }
     }
 }

@@ -187,6 +187,7 @@ pub fn run(arguments: &PrepareArguments) -> anyhow::Result<()> {
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("ply")) {
         return Err(UsageError::new(format!("{}: expected a name that ends in .ply", path.display())).into());
     }
+    output::spare_inputs(path, &arguments.inputs)?;
     output::check_file(path)?;
     use_threads(arguments.threads);
 

@@ -1,6 +1,6 @@
 //! `splat render`: clouds in, a picture out.
 
-use crate::arguments::{OutputArguments, RenderArguments};
+use crate::arguments::{MaterialArguments, OutputArguments, RenderArguments};
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
 use crate::choices::{ExrTypeChoice, ShadingChoice};
@@ -30,6 +30,9 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         let message = format!("{} exists: name the picture with -o", picture.display());
         return Err(UsageError::new(message).into());
     }
+    let MaterialArguments { texture, environment, .. } = &arguments.material;
+    let cameras = &arguments.camera.camera;
+    output::spare_inputs(&picture, arguments.inputs.iter().chain(texture).chain(environment).chain(cameras))?;
     output::check_picture(&picture, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
