@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
 use crate::usage::UsageError;
-use crate::{colors, describe, prepare as preparation, resolve};
+use crate::{colors, describe, output, prepare as preparation, resolve};
 use anyhow::{Context, ensure};
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
@@ -51,6 +51,7 @@ pub fn assemble(
 ) -> anyhow::Result<Assembled> {
     let images = material::read(&arguments.material, console)?;
     let sources = scene::sources(arguments)?;
+    output::spare_inputs(&arguments.picture(), sources.iter().map(|source| &source.path))?;
     ensure!(
         !sources.is_empty(),
         UsageError::new("the scene file has no [[cloud]]: there is nothing to draw")

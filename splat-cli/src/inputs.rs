@@ -80,6 +80,12 @@ pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -
         );
         let class = |index: usize| field.map_or(0.0, |field| field.values[index]);
         let kept: Vec<usize> = (0..import.cloud.len()).filter(|&index| classes.has(class(index))).collect();
+        ensure!(
+            !kept.is_empty() || import.cloud.is_empty(),
+            "{}: --classes: no point is of these classes, there are {}",
+            path.display(),
+            classes_of(&import.cloud)
+        );
         import.cloud = import.cloud.only(&kept);
     }
     Ok(import)
@@ -88,6 +94,15 @@ pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -
 /// Whether a file is an OBJ mesh, by its name.
 pub fn is_obj(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
+}
+
+/// The classes of a cloud's points, in words.
+fn classes_of(cloud: &Cloud) -> String {
+    let values = cloud.field("classification").map_or(&[][..], |field| &field.values);
+    let mut classes: Vec<String> = values.iter().map(ToString::to_string).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    if classes.is_empty() { "none".to_owned() } else { classes.join(", ") }
 }
 
 /// Reads a cloud, or a mesh as a cloud.

@@ -31,8 +31,8 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         return Err(UsageError::new(message).into());
     }
     let MaterialArguments { texture, environment, .. } = &arguments.material;
-    let cameras = &arguments.camera.camera;
-    output::spare_inputs(&picture, arguments.inputs.iter().chain(texture).chain(environment).chain(cameras))?;
+    let files = arguments.inputs.iter().chain(texture).chain(environment).chain(&arguments.camera.camera);
+    output::spare_inputs(&picture, files)?;
     output::check_picture(&picture, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_file(path)?;
@@ -163,11 +163,13 @@ fn picture_options(arguments: &OutputArguments) -> PictureOptions {
     }
 }
 
-/// Warns of dropped points and of an empty picture.
+/// Warns of bad points and of an empty picture. That some splats are seen edge-on is nobody's fault: the summary counts
+/// them.
 fn warn_of_losses(console: Console, statistics: &Statistics) {
-    if !statistics.dropped.is_empty() {
-        let dropped: usize = statistics.dropped.values().sum();
-        console.warn(format_args!("points dropped: {dropped} ({})", describe::causes(&statistics.dropped)));
+    let bad = || statistics.dropped.iter().filter(|(cause, _)| **cause != "edge_on");
+    let count: usize = bad().map(|(_, count)| count).sum();
+    if count > 0 {
+        console.warn(format_args!("points dropped: {count} ({})", describe::causes(bad())));
     }
     if statistics.drawn == 0 {
         console.warn("no splat is in view: the picture is empty");

@@ -209,7 +209,8 @@ impl Scene {
         for setting in &entry.settings {
             let arg = command.get_arguments().find(|arg| arg.get_long() == Some(&setting.name));
             let Some(arg) = arg else {
-                let names: Vec<&str> = command.get_arguments().filter_map(Arg::get_long).collect();
+                let names = command.get_arguments().filter_map(Arg::get_long);
+                let names: Vec<&str> = names.filter(|name| *name != "help").collect();
                 bail!(
                     "{}: line {}: found `{}`, expected path, translate, rotate, scale, matrix, or one of {}",
                     self.path.display(),

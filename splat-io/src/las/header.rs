@@ -53,7 +53,8 @@ impl Header {
             Err(Error::invalid(path, Place::Byte(at as u64), found, expected))
         };
         if !bytes.starts_with(b"LASF") {
-            return invalid(0, quoted(&bytes[..bytes.len().min(4)]), "LASF");
+            let start = quoted(&bytes[..bytes.len().min(4)]);
+            return invalid(0, if bytes.is_empty() { "an empty file".to_owned() } else { start }, "LASF");
         }
         let (Some([major, minor]), true) = (bytes_at(bytes, 24), bytes.len() >= HEADER_BYTES) else {
             return invalid(bytes.len(), "the end of the file".to_owned(), "a header of at least 227 bytes");
