@@ -1,10 +1,10 @@
 //! The resolve of `over` for eight samples at once: every fragment is a layer of its own, nearest first (SPEC section 6).
 //!
-//! Entries stand in splat order, that is by the nearest depth of their splats: so the fragments of a sample are nearly in
-//! order of depth. An insertion sort, each lane for itself, has to move few of them, and leaves those of equal depth in
-//! splat order. What a layer adds is divided before it is sorted, for all lanes; what remains are products.
+//! What a layer adds is divided before it is sorted, for all lanes; what remains are products. The samples of a cell are
+//! neighbours and mostly agree on the order. So the layers are sorted by the depths of one lane each, and then inserted
+//! one by one, each lane for itself: few have to move.
 
-use crate::lanes::{Eight, LANES, Lanes};
+use crate::lanes::{Eight, LANES, Lanes, prefetch};
 use crate::records::{Record, RecordBuffer};
 use crate::resolve::{Colors, ResolveCell};
 use splat_abuffer::{MIN_ALPHA, SplatSurface};
@@ -12,11 +12,19 @@ use splat_abuffer::{MIN_ALPHA, SplatSurface};
 /// Moves a vector of layers, in the mean of a cell, beyond which it costs less to sort each lane by keys.
 const MAX_MOVES: usize = 32;
 
+/// The greatest number of layers whose numbers `f32` can tell apart.
+const MAX_NUMBER: usize = 1 << f32::MANTISSA_DIGITS;
+
+/// How many entries ahead their records are asked for.
+const PREFETCHED: usize = 8;
+
 /// A layer of each of eight samples; its alpha is 0 where a sample has none.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(32))]
 struct StoredLayer {
     depth: Eight,
+    /// Its place in splat order, which decides between equal depths.
+    number: Eight,
     alpha: Eight,
     color: [Eight; 3],
 }
@@ -25,6 +33,7 @@ struct StoredLayer {
 #[derive(Clone, Copy)]
 struct Layer<L> {
     depth: L,
+    number: L,
     alpha: L,
     color: [L; 3],
 }
@@ -32,7 +41,7 @@ struct Layer<L> {
 impl<L: Lanes> Layer<L> {
     /// The layers of a record, and where there are any: where alpha is enough to be seen.
     #[inline(always)]
-    fn new(record: &Record, surface: &SplatSurface) -> (Self, L) {
+    fn new(record: &Record, surface: &SplatSurface, number: usize) -> (Self, L) {
         let alpha = L::load(&record.weight) * L::splat(surface.opacity);
         let seen = L::splat(MIN_ALPHA).less_or_equal(alpha);
         // Multiplied and divided again, as the reference does: the result may be another number.
@@ -41,24 +50,33 @@ impl<L: Lanes> Layer<L> {
             *lanes = (alpha * L::splat(value) / alpha) & seen;
         }
         let alpha = alpha.least(L::splat(1.0)) & seen;
-        (Self { depth: L::load(&record.depth), alpha, color }, seen)
+        (Self { depth: L::load(&record.depth), number: L::splat(number as f32), alpha, color }, seen)
     }
 
     #[inline(always)]
     fn load(stored: &StoredLayer) -> Self {
-        let StoredLayer { depth, alpha, color } = stored;
+        let StoredLayer { depth, number, alpha, color } = stored;
         let [red, green, blue] = color;
         let color = [L::load(red), L::load(green), L::load(blue)];
-        Self { depth: L::load(depth), alpha: L::load(alpha), color }
+        Self { depth: L::load(depth), number: L::load(number), alpha: L::load(alpha), color }
     }
 
     #[inline(always)]
     fn store(&self, to: &mut StoredLayer) {
         self.depth.store_cell::<0>(&mut to.depth);
+        self.number.store_cell::<0>(&mut to.number);
         self.alpha.store_cell::<0>(&mut to.alpha);
         for (lanes, values) in self.color.into_iter().zip(&mut to.color) {
             lanes.store_cell::<0>(values);
         }
+    }
+
+    /// Lanes in which this layer comes before another.
+    #[inline(always)]
+    fn before(&self, other: &Self) -> L {
+        let nearer = self.depth.less(other.depth);
+        let beyond = other.depth.less(self.depth);
+        nearer | self.number.less(other.number).and_not(beyond)
     }
 
     /// Where `mask` is set the lanes of `yes`, else those of `no`.
@@ -67,6 +85,7 @@ impl<L: Lanes> Layer<L> {
         let ([r, g, b], [other_r, other_g, other_b]) = (yes.color, no.color);
         Self {
             depth: mask.select(yes.depth, no.depth),
+            number: mask.select(yes.number, no.number),
             alpha: mask.select(yes.alpha, no.alpha),
             color: [mask.select(r, other_r), mask.select(g, other_g), mask.select(b, other_b)],
         }
@@ -76,19 +95,24 @@ impl<L: Lanes> Layer<L> {
 /// Resolves cells; keeps its memory between them.
 #[derive(Debug, Default)]
 pub struct Over {
+    /// The layers of a cell in splat order; the first `count` are in use, here and below.
     layers: Vec<StoredLayer>,
-    /// Scratch: the layers in order, and the keys of a lane.
+    /// The same, each lane in order.
     ordered: Vec<StoredLayer>,
+    count: usize,
     keys: Vec<u64>,
 }
 
 impl ResolveCell for Over {
     #[inline(always)]
     fn resolve_cell<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> Colors<L> {
+        let (covered, comparable) = self.collect::<L>(buffer, cell);
+        if !(comparable && self.insert_all::<L>()) {
+            self.sort_lanes();
+        }
         let mut colors = Colors::<L>::nothing();
-        let covered = self.collect::<L>(buffer, cell);
         colors.uncovered = colors.uncovered.and_not(covered);
-        for stored in &self.layers {
+        for stored in &self.ordered[..self.count] {
             let layer = Layer::load(stored);
             let visible = colors.transmittance * layer.alpha;
             for (sum, color) in colors.color.iter_mut().zip(layer.color) {
@@ -101,63 +125,73 @@ impl ResolveCell for Over {
 }
 
 impl Over {
-    /// Collects the layers of a cell, each lane's in order. Gives the lanes that have any.
+    /// Collects the layers of a cell, and keys of the depths of the first lane that each has. Gives the lanes that have any
+    /// layer, and whether comparisons suffice to sort them.
     #[inline(always)]
-    fn collect<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> L {
-        self.layers.clear();
-        let (mut moves, mut in_order) = (0, true);
-        let (mut covered, mut farthest) = (L::splat(0.0), L::splat(0.0));
-        for &entry in buffer.cell(cell).into_iter().flatten() {
-            let (mut layer, seen) = Layer::<L>::new(buffer.record(entry), buffer.surface(entry));
-            if seen.bits() == 0 {
-                continue;
-            }
-            covered = covered | seen;
-            // A comparison does not tell zeros apart, as an order of all numbers does.
-            in_order &= (layer.depth.less_or_equal(L::splat(0.0)) & seen).bits() == 0;
-            // A lane without a layer stays where it is.
-            layer.depth = seen.select(layer.depth, farthest);
-            farthest = layer.depth.greatest(farthest);
-            let place = self.layers.len();
-            self.layers.push(StoredLayer::default());
-            if in_order {
-                moves += self.insert(layer);
-                in_order = moves <= MAX_MOVES * (place + 1);
-            } else {
-                layer.store(&mut self.layers[place]);
+    fn collect<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> (L, bool) {
+        self.count = 0;
+        self.keys.clear();
+        let room: usize = buffer.cell(cell).iter().map(|entries| entries.len()).sum();
+        if self.layers.len() < room {
+            self.layers.resize(room, StoredLayer::default());
+            self.ordered.resize(room, StoredLayer::default());
+        }
+        let (mut covered, mut not_positive) = (L::splat(0.0), L::splat(0.0));
+        for entries in buffer.cell(cell) {
+            for (i, &entry) in entries.iter().enumerate() {
+                let next = entries[(i + PREFETCHED).min(entries.len() - 1)];
+                prefetch(buffer.record(next));
+                let number = self.count;
+                let (layer, seen) = Layer::<L>::new(buffer.record(entry), buffer.surface(entry), number);
+                if seen.bits() == 0 {
+                    continue;
+                }
+                covered = covered | seen;
+                not_positive = not_positive | (layer.depth.less_or_equal(L::splat(0.0)) & seen);
+                layer.store(&mut self.layers[number]);
+                self.count += 1;
+                let lane = seen.bits().trailing_zeros() as usize % LANES;
+                self.keys.push(key(buffer.record(entry).depth[lane], number));
             }
         }
-        if !in_order {
-            self.sort_lanes();
-        }
-        covered
+        // Comparisons do not tell zeros apart, as the order of all numbers does, nor do large numbers stay exact.
+        (covered, not_positive.bits() == 0 && self.count <= MAX_NUMBER)
     }
 
-    /// Inserts a layer into those that are in order before the last place, which is free. Gives the number of places
-    /// by which it moved.
+    /// Puts the layers of each lane in order, if they nearly are by their keys. Gives up, and false, after too many moves.
     #[inline(always)]
-    fn insert<L: Lanes>(&mut self, mut layer: Layer<L>) -> usize {
-        let last = self.layers.len() - 1;
-        let mut place = last;
-        while place > 0 {
-            let before = Layer::load(&self.layers[place - 1]);
-            let nearer = layer.depth.less(before.depth);
-            if nearer.bits() == 0 {
-                break;
+    fn insert_all<L: Lanes>(&mut self) -> bool {
+        self.keys.sort_unstable();
+        // The last layer of each lane so far.
+        let zero = L::splat(0.0);
+        let mut last = Layer { depth: zero, number: zero, alpha: zero, color: [zero; 3] };
+        let mut moves = 0;
+        for (place, &key) in self.keys.iter().enumerate() {
+            let mut layer = Layer::load(&self.layers[key as u32 as usize]);
+            // A lane without a layer stays where it is.
+            let seen = zero.less(layer.alpha);
+            layer.depth = seen.select(layer.depth, last.depth);
+            layer.number = seen.select(layer.number, last.number);
+            let early = layer.before(&last);
+            if early.bits() == 0 {
+                layer.store(&mut self.ordered[place]);
+                last = layer;
+            } else {
+                moves += insert(&mut self.ordered[..=place], layer);
+                last = Layer::select(early, &last, &layer);
+                if moves > MAX_MOVES * (place + 1) {
+                    return false;
+                }
             }
-            Layer::select(nearer, &before, &layer).store(&mut self.layers[place]);
-            layer = Layer::select(nearer, &layer, &before);
-            place -= 1;
         }
-        layer.store(&mut self.layers[place]);
-        last - place
+        true
     }
 
     /// Puts the layers of each lane in order, whatever order they are in; of equal depths the first stays first.
     fn sort_lanes(&mut self) {
-        let Self { layers, ordered, keys } = self;
-        ordered.clear();
-        ordered.resize(layers.len(), StoredLayer::default());
+        let Self { layers, ordered, count, keys } = self;
+        let (layers, ordered) = (&layers[..*count], &mut ordered[..*count]);
+        ordered.fill(StoredLayer::default());
         for lane in 0..LANES {
             let seen = layers.iter().enumerate().filter(|(_, layer)| layer.alpha[lane] > 0.0);
             keys.clear();
@@ -171,8 +205,27 @@ impl Over {
                 }
             }
         }
-        std::mem::swap(layers, ordered);
     }
+}
+
+/// Inserts a layer into those that are in order before the last place, which is free. Gives the number of places by which
+/// it moved.
+#[inline(always)]
+fn insert<L: Lanes>(layers: &mut [StoredLayer], mut layer: Layer<L>) -> usize {
+    let last = layers.len() - 1;
+    let mut place = last;
+    while place > 0 {
+        let other = Layer::load(&layers[place - 1]);
+        let early = layer.before(&other);
+        if early.bits() == 0 {
+            break;
+        }
+        Layer::select(early, &other, &layer).store(&mut layers[place]);
+        layer = Layer::select(early, &layer, &other);
+        place -= 1;
+    }
+    layer.store(&mut layers[place]);
+    last - place
 }
 
 /// A key that sorts by depth, as [`f32::total_cmp`] does, and then by a number, which stands in the lower half.
@@ -211,15 +264,18 @@ mod tests {
         buffer
     }
 
-    /// Resolves the only cell of a buffer.
+    /// Resolves the only cell of a buffer, and tells whether its lanes had to be sorted by keys.
     struct OneCell<'a>(&'a mut Over, &'a RecordBuffer);
 
     impl Kernel for OneCell<'_> {
-        type Output = [Eight; 5];
+        type Output = ([Eight; 5], bool);
 
         #[inline(always)]
-        fn run<L: Lanes>(self) -> [Eight; 5] {
-            self.0.resolve_cell::<L>(self.1, 0).to_arrays()
+        fn run<L: Lanes>(self) -> ([Eight; 5], bool) {
+            let Self(over, buffer) = self;
+            let (_, comparable) = over.collect::<L>(buffer, 0);
+            let inserted = comparable && over.insert_all::<L>();
+            (over.resolve_cell::<L>(buffer, 0).to_arrays(), !inserted)
         }
     }
 
@@ -230,8 +286,8 @@ mod tests {
         let mut by_keys = false;
         for level in Level::available() {
             let mut over = Over::default();
-            let found = level.run_single(OneCell(&mut over, &buffer));
-            by_keys = !over.ordered.is_empty();
+            let (found, sorted) = level.run_single(OneCell(&mut over, &buffer));
+            by_keys = sorted;
             for lane in 0..LANES {
                 let entries = buffer.cell(0).into_iter().flatten();
                 let mut fragments: Vec<_> =

@@ -718,7 +718,8 @@ fn fragments_laid_over_each_other_agree() {
         if let (Some(scale), Shapes::Discs(all)) = (sizes, &mut cloud.shapes) {
             all.iter_mut().for_each(|size| *size *= scale * random.log_range(0.3, 1.0) as f32);
         }
-        for opacity in cloud.opacities.iter_mut().flatten() {
+        let count = cloud.len();
+        for opacity in cloud.opacities.get_or_insert_with(|| vec![1.0; count]) {
             let limit = splat_abuffer::MIN_ALPHA;
             *opacity = [*opacity, limit, limit.next_down(), random.unit() as f32][random.index(4)];
         }
