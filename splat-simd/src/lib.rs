@@ -8,6 +8,7 @@ mod compare;
 mod evaluate;
 mod lanes;
 mod lattice;
+mod over;
 mod places;
 mod raster;
 mod records;

@@ -2,10 +2,11 @@
 
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Lattice};
+use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob};
 use crate::records::{RecordBuffer, cell_of};
-use crate::resolve::ResolveJob;
+use crate::resolve::{ResolveCell, ResolveJob, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
 use rayon::prelude::*;
@@ -52,6 +53,7 @@ struct Worker {
     cells: Vec<CellNumber>,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
+    over: Over,
 }
 
 /// A finished tile.
@@ -353,30 +355,41 @@ impl<'a> Picture<'a> {
         statistics.tests += tests;
         statistics.fragments += worker.records.fragments;
         let start = Instant::now();
-        match (self.options.resolve, self.options.aovs) {
-            (Resolve::Surface { coverage, thickness: Thickness::AroundHit }, aovs) if few(aovs) => {
-                let mut shader = self.shader();
-                self.level.run_single(ResolveJob {
-                    region: *region,
-                    buffer: &mut worker.records,
-                    shader: shader.as_mut(),
-                    samples: &self.samples,
-                    coverage,
-                    opaque: self.cloud.opacities.is_none(),
-                    lattice,
-                    scratch: &mut worker.colors,
-                    pixels,
-                    film,
-                });
+        match self.options.resolve {
+            Resolve::Surface { coverage, thickness: Thickness::AroundHit } if few(self.options.aovs) => {
+                if self.cloud.opacities.is_none() {
+                    self.resolve_cells(
+                        worker,
+                        region,
+                        lattice,
+                        &mut Surfaces::<true> { coverage },
+                        pixels,
+                        film,
+                    );
+                } else {
+                    self.resolve_cells(
+                        worker,
+                        region,
+                        lattice,
+                        &mut Surfaces::<false> { coverage },
+                        pixels,
+                        film,
+                    );
+                }
+            }
+            Resolve::Over if few(self.options.aovs) => {
+                let mut over = std::mem::take(&mut worker.over);
+                self.resolve_cells(worker, region, lattice, &mut over, pixels, film);
+                worker.over = over;
             }
             _ => self.resolve_each(worker, region, lattice, pixels, film),
         }
         statistics.resolve += start.elapsed();
     }
 
-    /// Whether both sides of a splat can be seen, and are not the same.
+    /// Whether both sides of a splat can be seen, and are not the same to the resolve.
     fn two_sided(&self) -> bool {
-        self.cloud.oriented && !self.options.cull
+        self.cloud.oriented && !self.options.cull && self.options.resolve != Resolve::Over
     }
 
     /// If colours differ from pixel to pixel, the shader for a tile.
@@ -399,8 +412,32 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Resolves sample by sample, as the reference does: for `over`, the listing's intervals, and the AOVs that ask for
-    /// the fragments of a layer.
+    /// Resolves eight samples at once, by `cells`.
+    fn resolve_cells(
+        &self,
+        worker: &mut Worker,
+        region: &PixelRect,
+        lattice: Option<&Lattice>,
+        cells: &mut impl ResolveCell,
+        pixels: &mut PixelResolver<'_>,
+        film: &mut Film,
+    ) {
+        let mut shader = self.shader();
+        self.level.run_single(ResolveJob {
+            region: *region,
+            buffer: &mut worker.records,
+            shader: shader.as_mut(),
+            samples: &self.samples,
+            cells,
+            lattice,
+            scratch: &mut worker.colors,
+            pixels,
+            film,
+        });
+    }
+
+    /// Resolves sample by sample, as the reference does: for the listing's intervals, and the AOVs that ask for the
+    /// fragments of a layer.
     fn resolve_each(
         &self,
         worker: &mut Worker,

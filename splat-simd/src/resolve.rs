@@ -1,4 +1,4 @@
-//! The resolve of eight samples at once: SPEC section 6, without a sort.
+//! The resolve of eight samples at once: SPEC section 6, surfaces without a sort.
 //!
 //! A layer is grown from the nearest fragment that remains: whatever overlaps it is absorbed, until nothing changes. As a
 //! fragment's interval holds its depth, the layers come out front to back; as entries stand in splat order, each sum runs
@@ -14,8 +14,14 @@ use splat_abuffer::{Coverage, MIN_LAYER_WEIGHT, SampleColor, SplatSurface};
 use splat_core::pixel::PixelResolver;
 use splat_core::{Film, PixelRect};
 
+/// What makes the colours of the samples of a cell.
+pub trait ResolveCell {
+    /// The colours of the eight samples of a cell.
+    fn resolve_cell<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> Colors<L>;
+}
+
 /// Resolves a region's samples into a film that holds the pixels without fragments already.
-pub struct ResolveJob<'a, 'b, 'c> {
+pub struct ResolveJob<'a, 'b, 'c, C> {
     /// The pixels; they lie within one tile.
     pub region: PixelRect,
     /// Their records, grouped.
@@ -24,10 +30,8 @@ pub struct ResolveJob<'a, 'b, 'c> {
     pub shader: Option<&'a mut TileShader<'c>>,
     /// The samples.
     pub samples: &'a LaneSamples,
-    /// How much of a sample a surface covers.
-    pub coverage: Coverage,
-    /// Whether every splat is opaque.
-    pub opaque: bool,
+    /// Resolves a cell.
+    pub cells: &'a mut C,
     /// What the cells are, if not groups of the samples of a pixel.
     pub lattice: Option<&'a Lattice>,
     /// Scratch.
@@ -38,24 +42,22 @@ pub struct ResolveJob<'a, 'b, 'c> {
     pub film: &'a mut Film,
 }
 
-impl Kernel for ResolveJob<'_, '_, '_> {
+impl<C: ResolveCell> Kernel for ResolveJob<'_, '_, '_, C> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(mut self) {
-        match (self.lattice, self.opaque) {
-            (None, true) => self.resolve_pixels::<L, true>(),
-            (None, false) => self.resolve_pixels::<L, false>(),
-            (Some(lattice), true) => self.resolve_lattice::<L, true>(lattice),
-            (Some(lattice), false) => self.resolve_lattice::<L, false>(lattice),
+        match self.lattice {
+            None => self.resolve_pixels::<L>(),
+            Some(lattice) => self.resolve_lattice::<L>(lattice),
         }
     }
 }
 
-impl ResolveJob<'_, '_, '_> {
+impl<C: ResolveCell> ResolveJob<'_, '_, '_, C> {
     /// Resolves cells of samples of one pixel.
     #[inline(always)]
-    fn resolve_pixels<L: Lanes, const OPAQUE: bool>(&mut self) {
+    fn resolve_pixels<L: Lanes>(&mut self) {
         let groups = self.samples.groups();
         for y in self.region.y0..self.region.y1 {
             for x in self.region.x0..self.region.x1 {
@@ -69,7 +71,7 @@ impl ResolveJob<'_, '_, '_> {
                 }
                 self.pixels.start();
                 for group in 0..groups {
-                    let colors = self.resolve_cell::<L, OPAQUE>(cell_of(place, group)).to_arrays();
+                    let colors = self.cells.resolve_cell::<L>(self.buffer, cell_of(place, group)).to_arrays();
                     let samples = 0..self.samples.samples_of(group).min(LANES);
                     self.pixels.add_colors(samples.map(|lane| sample_of(&colors, lane)));
                 }
@@ -80,12 +82,12 @@ impl ResolveJob<'_, '_, '_> {
 
     /// Resolves the cells of a lattice, and puts their samples in order.
     #[inline(always)]
-    fn resolve_lattice<L: Lanes, const OPAQUE: bool>(&mut self, lattice: &Lattice) {
+    fn resolve_lattice<L: Lanes>(&mut self, lattice: &Lattice) {
         let count = self.samples.samples();
         self.scratch.clear();
         self.scratch.resize(PLACES * count, SampleColor::NOTHING);
         for cell in (0..lattice.cells()).filter(|&cell| !self.buffer.is_empty(cell)) {
-            let colors = self.resolve_cell::<L, OPAQUE>(cell).to_arrays();
+            let colors = self.cells.resolve_cell::<L>(self.buffer, cell).to_arrays();
             for (lane, &(place, sample)) in lattice.samples(cell).iter().enumerate() {
                 self.scratch[usize::from(place) * count + sample as usize] = sample_of(&colors, lane);
             }
@@ -99,13 +101,20 @@ impl ResolveJob<'_, '_, '_> {
             }
         }
     }
+}
 
-    /// The colours of the samples of a cell.
+/// Fragments that overlap in depth are one surface.
+pub struct Surfaces<const OPAQUE: bool> {
+    /// How much of a sample a surface covers.
+    pub coverage: Coverage,
+}
+
+impl<const OPAQUE: bool> ResolveCell for Surfaces<OPAQUE> {
     #[inline(always)]
-    fn resolve_cell<L: Lanes, const OPAQUE: bool>(&self, cell: usize) -> Colors<L> {
+    fn resolve_cell<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> Colors<L> {
         let resolver = CellResolver::<L, OPAQUE> {
-            remaining: self.buffer.cell(cell),
-            buffer: self.buffer,
+            remaining: buffer.cell(cell),
+            buffer,
             coverage: self.coverage,
             colors: Colors::nothing(),
         };
@@ -124,21 +133,25 @@ fn sample_of([red, green, blue, transmittance, uncovered]: &[Eight; 5], lane: us
 }
 
 /// The colours of eight samples in the making.
-struct Colors<L> {
-    color: [L; 3],
-    transmittance: L,
-    uncovered: L,
+pub struct Colors<L> {
+    /// Red, green and blue: [`SampleColor::color`].
+    pub color: [L; 3],
+    /// [`SampleColor::transmittance`].
+    pub transmittance: L,
+    /// [`SampleColor::uncovered`].
+    pub uncovered: L,
 }
 
 impl<L: Lanes> Colors<L> {
+    /// Those of samples that hit nothing.
     #[inline(always)]
-    fn nothing() -> Self {
+    pub fn nothing() -> Self {
         Self { color: [L::splat(0.0); 3], transmittance: L::splat(1.0), uncovered: L::splat(1.0) }
     }
 
     /// Red, green, blue, transmittance and what is uncovered of each lane.
     #[inline(always)]
-    fn to_arrays(&self) -> [Eight; 5] {
+    pub fn to_arrays(&self) -> [Eight; 5] {
         let mut values = [[0.0; LANES]; 5];
         let [red, green, blue] = self.color;
         for (values, lanes) in values.iter_mut().zip([red, green, blue, self.transmittance, self.uncovered]) {

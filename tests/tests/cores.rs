@@ -704,6 +704,60 @@ fn sheets_agree() {
     }
 }
 
+/// `over`, in lanes: nearly sorted and not, many fragments of one depth, more than 64 a sample, and alphas at the limit.
+#[test]
+fn fragments_laid_over_each_other_agree() {
+    let (most, equal, limits) = (RefCell::new(0), RefCell::new(0), RefCell::new(0));
+    let sizes = prop_oneof![Just(None), (0.2f32..1.0).prop_map(Some), (1.5f32..3.0).prop_map(Some)];
+    let lens = prop_oneof![2 => Just(0.0), 1 => 0.2..0.6];
+    let kernel = prop_oneof![2 => Just(Kernel::Gaussian), 1 => Just(Kernel::Disc)];
+    let case = (layered(), sizes, lens, (1u32..20, kernel, any::<bool>(), any::<bool>()));
+    check(24, 6, case, |((made, _, seed), sizes, radius, (samples, kernel, cull, orthographic_view))| {
+        let mut cloud = sheets(&made, seed);
+        let mut random = Random::new(seed);
+        if let (Some(scale), Shapes::Discs(all)) = (sizes, &mut cloud.shapes) {
+            all.iter_mut().for_each(|size| *size *= scale * random.log_range(0.3, 1.0) as f32);
+        }
+        let count = cloud.len();
+        for opacity in cloud.opacities.get_or_insert_with(|| vec![1.0; count]) {
+            let limit = splat_abuffer::MIN_ALPHA;
+            *opacity = [*opacity, limit, limit.next_down(), random.unit() as f32][random.index(4)];
+        }
+        let focused = Lens { radius, focus: 4.5, blades: 0 };
+        let camera = match (orthographic_view, radius > 0.0) {
+            (true, _) => orthographic(40, 36, 15.0),
+            (false, true) => with_lens(pinhole(40, 36, 60.0), focused),
+            (false, false) => pinhole(40, 36, 60.0),
+        };
+        let aovs = AovSelection { coverage: true, variance: true, ..AovSelection::default() };
+        let aovs = [AovSelection::default(), aovs, AovSelection::ALL][[0, 1, 1, 2][random.index(4)]];
+        let resolve = Resolve::Over;
+        let options =
+            RenderOptions { samples, resolve, kernel, cutoff: 9.0, cull, aovs, ..RenderOptions::default() };
+        let threads = 1 + seed as usize % 3;
+        check_pictures(&cloud, &camera, &options, &[threads], &TILE_MEMORY[seed as usize % 3..][..1]);
+        // That there was something to tell apart.
+        let mut found = BTreeMap::<SamplePlace, Vec<u32>>::new();
+        let opacities = cloud.opacities.as_ref().unwrap();
+        splat_core::fragments(&cloud, &camera, &options, &mut |place, index, fragment| {
+            found.entry(place).or_default().push(fragment.depth.to_bits());
+            let alpha = fragment.weight * opacities[index as usize];
+            *limits.borrow_mut() += usize::from(alpha == splat_abuffer::MIN_ALPHA);
+        })
+        .unwrap();
+        for mut depths in found.into_values() {
+            let count = depths.len();
+            depths.sort_unstable();
+            depths.dedup();
+            *equal.borrow_mut() += usize::from(depths.len() < count);
+            let mut most = most.borrow_mut();
+            *most = count.max(*most);
+        }
+    });
+    let (most, equal, limits) = (most.into_inner(), equal.into_inner(), limits.into_inner());
+    assert!(most > 200 && equal > 1000 && limits > 1000, "{most} {equal} {limits}");
+}
+
 #[test]
 fn closed_surfaces_agree_from_outside_and_inside() {
     let mut seen = 0;
