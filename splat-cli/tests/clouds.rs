@@ -139,7 +139,7 @@ fn classes_are_chosen_and_left_out() {
             succeeds(folder.path(), &format!("convert hill.ply -o out.laz --classes {classes}"));
         assert!(message.contains(&format!("{count} points")), "{classes}: {message}");
     }
-    assert!(fails(folder.path(), "render hill.ply -o out.png --classes 9", 1).contains("empty"));
+    assert!(fails(folder.path(), "render hill.ply -o out.png --classes 9", 1).contains("there are 2, 6"));
     fs::write(folder.path().join("bare.xyz"), "1 2 3\n").unwrap();
     assert!(fails(folder.path(), "render bare.xyz -o out.png --classes 2", 1).contains("no classification"));
     succeeds(folder.path(), "convert bare.xyz -o out.las --classes !7,18");
