@@ -77,7 +77,7 @@ mod tests {
         let [input, other] = ["in.ply", "other.ply"].map(|name| folder.path().join(name));
         std::fs::write(&input, "x").unwrap();
         std::fs::write(&other, "x").unwrap();
-        let inputs = [other.clone(), input.clone()];
+        let inputs = [other.clone(), input];
         assert!(spare_inputs(&folder.path().join("new.ply"), &inputs).is_ok());
         assert!(spare_inputs(&folder.path().join(".").join("in.ply"), &inputs).is_err());
         #[cfg(unix)]

@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release -p splat-simd --example 2_own_points`
 
+#![expect(clippy::disallowed_methods, reason = "the last bits of this shape may be any")]
+
 use glam::{DMat4, DVec2, DVec3, Vec3};
 use splat_core::{AovSelection, Camera, Cloud, Lens, Projection, RenderOptions, Shapes};
 use splat_io::{Metadata, PictureOptions, write_picture};
