@@ -72,7 +72,7 @@ pub struct PreparationArguments {
     /// Factor on all sizes, given and estimated
     #[arg(long, value_name = "FACTOR", value_parser = values::positive, default_value_t = 1.0)]
     pub radius_scale: f64,
-    /// Stray points to drop: none, statistical[:K,SIGMAS] or radius:R,N
+    /// Stray points to drop: none, statistical or statistical:K,SIGMAS, radius:R,N
     ///
     /// statistical drops points whose mean distance to K neighbours (default 8) is more than SIGMAS standard deviations
     /// (default 3) above the mean of all; radius drops those with fewer than N others within R scene units.

@@ -89,7 +89,7 @@ impl Distortion {
 /// The lens distortion of a camera, both ways. *Film* places are those of the picture, *ideal* ones where a camera without
 /// distortion would see the same; both in pixels.
 ///
-/// What is seen lies within a disc of the ideal picture about the axis, in which the slope is at least [`LEAST_SLOPE`] in
+/// What is seen lies within a disc of the ideal picture about the axis, in which the slope is at least 1/8 in
 /// all directions: there distortion is the gradient of a convex function, so no two places are seen in the same one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmMap {
