@@ -144,6 +144,7 @@ fn one_by_one(
     let count = parts.len() as f64;
     let mut clouds = Vec::new();
     let mut runs: Vec<(usize, Material)> = Vec::new();
+    let mut color = String::new();
     for (index, Part { source, mut cloud, images }) in parts.into_iter().enumerate() {
         let Source { path, to_world, settings } = source;
         let CloudArguments { colors: own, material, radius_scale, opacity, .. } = &settings;
@@ -160,7 +161,10 @@ fn one_by_one(
         cloud.place(&to_world);
         let up = resolve::up(&arguments.camera, &cloud);
         if let Some(choice) = choice {
-            colors::apply(&mut cloud, choice, own, up, console).with_context(context)?;
+            let words = colors::apply(&mut cloud, choice, own, up, console).with_context(context)?;
+            if !words.is_empty() {
+                color += &format!(" [{}:{words}]", path.display());
+            }
         }
         if *opacity < 1.0 {
             let opacities = cloud.opacities.get_or_insert_with(|| vec![1.0; cloud.positions.len()]);
@@ -172,7 +176,7 @@ fn one_by_one(
         runs.push((cloud.len(), material::material(material, images, &cloud, up).with_context(context)?));
         clouds.push(cloud);
     }
-    Ok((Cloud::join(clouds)?, Materials::of_runs(runs), String::new()))
+    Ok((Cloud::join(clouds)?, Materials::of_runs(runs), color))
 }
 
 /// Says what was assumed of files and clouds, if anyone wants to know.

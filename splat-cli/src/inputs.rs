@@ -164,18 +164,11 @@ mod tests {
     use glam::{DVec3, Vec3};
     use splat_core::Shapes;
 
-    fn cloud(at: DVec3, count: usize) -> Cloud {
-        let points: Vec<DVec3> = (0..count).map(|i| at + DVec3::X * i as f64).collect();
-        let mut cloud = Cloud::from_points(&points);
-        cloud.normals = vec![Vec3::Z; count];
-        cloud.oriented = true;
-        cloud
-    }
-
     #[test]
     fn a_cloud_without_a_usable_point_is_refused() {
         assert!(check_usable(&Cloud::default(), &[]).unwrap_err().to_string().contains("empty"));
-        let mut bad = cloud(DVec3::ZERO, 3);
+        let mut bad = Cloud::from_points(&[DVec3::ZERO; 3]);
+        bad.normals = vec![Vec3::Z; 3];
         bad.shapes = Shapes::Discs(vec![-1.0, f32::NAN, -1.0]);
         let message = check_usable(&bad, &[]).unwrap_err().to_string();
         assert!(message.ends_with("(2 negative_size, 1 not_finite)"), "{message}");

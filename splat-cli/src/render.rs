@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::statistics::{self, Report, Times, is_stdout};
 use crate::usage::UsageError;
 use crate::values::ViewDirection;
-use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve};
+use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve, scene};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
 use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, write_picture};
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
-    let Assembled { cloud, reports, materials, color, options, .. } =
+    let Assembled { cloud, reports, materials, color, options } =
         assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
@@ -113,6 +113,9 @@ impl Picture<'_> {
         }
         if let Some(ViewDirection { azimuth, elevation }) = arguments.splats.light {
             in_words += &format!(" --light {azimuth},{elevation}");
+        }
+        if arguments.scene.is_some() {
+            in_words += &format!("\n{}", scene::clouds(arguments));
         }
         let metadata = Metadata {
             input_hash: Some(hashes.join(" ")),

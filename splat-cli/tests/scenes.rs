@@ -131,6 +131,23 @@ fn clouds_have_places_and_looks_of_their_own() {
 }
 
 #[test]
+fn paths_of_a_scene_elsewhere_are_printed_as_they_are_from_here() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::create_dir(folder.join("scenes")).unwrap();
+    stdout(folder, "render red.ply -o scenes/t.png --size 8x8 --quiet");
+    let scene = "[[cloud]]\npath = \"../red.ply\"\ntexture = \"t.png\"\nmapping = \"planar\"\n\
+                 [film]\nsize = \"80x60\"\nspp = 4\n";
+    fs::write(folder.join("scenes/s.toml"), scene).unwrap();
+    fs::write(folder.join("p.toml"), stdout(folder, "render scenes/s.toml --print-config")).unwrap();
+    assert_eq!(picture(folder, "p.toml"), picture(folder, "scenes/s.toml"));
+    // The picture says what it was made of.
+    let bytes = fs::read(folder.join("out.png")).unwrap();
+    let says = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
+    assert!(says("[[cloud]]") && says("texture = \"scenes/t.png\""));
+}
+
+#[test]
 fn what_is_wrong_is_said_with_its_line() {
     let folder = folder();
     let folder = folder.path();

@@ -114,26 +114,29 @@ pub fn parse(line: Vec<OsString>) -> anyhow::Result<(Arguments, ArgMatches)> {
     Ok((arguments, matches))
 }
 
-/// Prints the scene file that a command line means.
-///
-/// # Errors
-/// What is wrong with the options; that nobody listens.
-pub fn print(arguments: &RenderArguments, matches: &ArgMatches) -> anyhow::Result<()> {
+/// The clouds of a command line as a scene file has them.
+pub fn clouds(arguments: &RenderArguments) -> String {
     let mut text = String::new();
     for path in &arguments.inputs {
         match &arguments.scene {
             Some(scene) if scene.path == *path => {
                 for entry in &scene.file.clouds {
-                    text.push_str(&print::cloud(
-                        &scene.resolve(&entry.path),
-                        &entry.to_world,
-                        &entry.settings,
-                    ));
+                    let settings = scene.from_here(&entry.settings);
+                    text.push_str(&print::cloud(&scene.resolve(&entry.path), &entry.to_world, &settings));
                 }
             }
             _ => text.push_str(&print::cloud(path, &DAffine3::IDENTITY, &[])),
         }
     }
+    text
+}
+
+/// Prints the scene file that a command line means.
+///
+/// # Errors
+/// What is wrong with the options; that nobody listens.
+pub fn print(arguments: &RenderArguments, matches: &ArgMatches) -> anyhow::Result<()> {
+    let mut text = clouds(arguments);
     // The words that metadata have for options are options; some are left to the cloud.
     let words = describe::options(&resolve::options(arguments, false)?);
     let mut left_to_cloud = vec!["shading"];
@@ -180,6 +183,11 @@ fn table_of(arg: &Arg) -> Option<String> {
     (heading != "program").then_some(heading)
 }
 
+/// Whether an option's value is the path of a file.
+fn is_path(arg: &Arg) -> bool {
+    arg.get_value_parser().type_id() == ValueParser::path_buf().type_id()
+}
+
 impl Scene {
     /// A path of the scene file, which may be relative to its folder.
     pub fn resolve(&self, path: &Path) -> PathBuf {
@@ -199,6 +207,20 @@ impl Scene {
             }
         }
         Ok(options)
+    }
+
+    /// The settings of a cloud, paths not relative to the scene file's folder but as they are from here.
+    fn from_here(&self, settings: &[Setting]) -> Vec<Setting> {
+        let command = CloudArguments::command();
+        let takes_path =
+            |name: &str| command.get_arguments().any(|arg| arg.get_long() == Some(name) && is_path(arg));
+        let mut settings = settings.to_vec();
+        for Setting { name, value, .. } in &mut settings {
+            if let (Value::Text(text), true) = (value, takes_path(name)) {
+                *text = self.resolve(Path::new(text)).to_string_lossy().into_owned();
+            }
+        }
+        settings
     }
 
     /// What is said of a cloud, besides where it is.
@@ -269,8 +291,8 @@ impl Scene {
             Value::Flag(false) => Ok(None),
             Value::Flag(true) if may_stand_alone => Ok(Some(option.into())),
             Value::Text(text) if takes_values => {
-                let is_path = arg.get_value_parser().type_id() == ValueParser::path_buf().type_id();
-                let value = if is_path { self.resolve(Path::new(text)).into() } else { OsString::from(text) };
+                let value =
+                    if is_path(arg) { self.resolve(Path::new(text)).into() } else { OsString::from(text) };
                 Ok(Some([OsString::from(option + "="), value].into_iter().collect()))
             }
             value => {
