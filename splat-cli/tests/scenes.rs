@@ -179,3 +179,14 @@ fn a_picture_needs_no_name_and_destroys_nothing() {
     let said = failure(folder, &format!("render red.ply {SMALL}"));
     assert!(said.contains("red.png exists: name the picture with -o"), "{said}");
 }
+
+#[test]
+fn clouds_that_convert_cannot_join_are_refused_not_guessed() {
+    let folder = folder();
+    let folder = folder.path();
+    stdout(folder, "prepare bare.xyz -o ellipses.ply --quiet");
+    let said = failure(folder, "convert ellipses.ply bare.xyz -o all.ply");
+    assert!(said.contains("normals") && !said.contains("panicked"), "{said}");
+    // To draw them is no matter: each is completed first.
+    picture(folder, &format!("ellipses.ply bare.xyz {SMALL}"));
+}

@@ -1,6 +1,7 @@
 //! Clouds made of parts of others: some of the splats of one, or all of several.
 
 use crate::harmonics::{SphericalHarmonics, constant_term, terms};
+use crate::prepare::unknown_sizes;
 use crate::setup::UNCOLORED_LIT;
 use crate::{Cloud, Error, Field, Shapes, TextureCoordinates, srgb};
 use glam::{DVec3, Vec3};
@@ -47,7 +48,8 @@ impl Cloud {
     /// normals tell the outside, and the splats are trained ones, if it is so in all clouds.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if some clouds have normals and some have none.
+    /// [`Error::Invalid`] if some clouds have normals and some have none, and if round splats without normals or sizes
+    /// are joined with ellipses: they must be completed first ([`crate::prepare`]).
     pub fn join(mut clouds: Vec<Self>) -> Result<Self, Error> {
         if clouds.len() > 1 {
             clouds.retain(|cloud| !cloud.is_empty());
@@ -59,6 +61,13 @@ impl Cloud {
         if with_normals != 0 && with_normals != clouds.len() {
             let found = format!("some in {with_normals} of {} clouds", clouds.len());
             return Err(Error::invalid("normals", found, "some in all clouds or in none"));
+        }
+        let is_round = |cloud: &Self| matches!(cloud.shapes, Shapes::Discs(_));
+        // A bad point may keep an unknown size: it is a defect anyway.
+        let is_bare = |cloud: &Self| cloud.normals.is_empty() || unknown_sizes(cloud) == cloud.len();
+        if !clouds.iter().all(is_round) && clouds.iter().any(|cloud| is_round(cloud) && is_bare(cloud)) {
+            let expected = "all known, where round splats are joined with ellipses";
+            return Err(Error::invalid("normals and sizes", "some unknown", expected));
         }
         let worlds =
             clouds.iter().flat_map(|cloud| (0..cloud.len()).map(|index| cloud.world_position(index)));
@@ -202,7 +211,14 @@ mod tests {
         assert_eq!(both.field("intensity").unwrap().values, [7.0, 7.0]);
         let bare = Cloud { normals: Vec::new(), ..plain.clone() };
         assert!(Cloud::differ([plain.clone(), bare.clone()].iter()));
-        assert!(Cloud::join(vec![plain, bare]).unwrap_err().to_string().contains("normals"));
+        assert!(Cloud::join(vec![plain, bare.clone()]).unwrap_err().to_string().contains("normals"));
+        // Tangent axes alone, as files have them, with round splats of which less is known.
+        let axes = Cloud {
+            normals: Vec::new(),
+            shapes: Shapes::Ellipses(vec![[Vec3::X, Vec3::Y]; 2]),
+            ..bare.clone()
+        };
+        assert!(Cloud::join(vec![axes, bare]).unwrap_err().to_string().contains("normals and sizes"));
     }
 
     #[test]

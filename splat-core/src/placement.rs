@@ -64,13 +64,13 @@ impl Cloud {
     }
 
     /// Turns round splats into ellipses of the same extent, so that the cloud can be joined with one of ellipses.
-    /// Normals must be known.
+    /// Splats without a normal or a size become defects.
     pub fn make_elliptical(&mut self) {
         if matches!(self.shapes, Shapes::Ellipses(_)) {
             return;
         }
         let ellipse = |index: usize| -> [Vec3; 2] {
-            let normal = self.normals[index].as_dvec3().normalize_or_zero();
+            let normal = self.normals.get(index).copied().unwrap_or_default().as_dvec3().normalize_or_zero();
             world_axes(self, index, normal).map(|axis| axis.as_vec3())
         };
         self.shapes = Shapes::Ellipses((0..self.len()).map(ellipse).collect());

@@ -121,7 +121,7 @@ pub fn clouds(arguments: &RenderArguments) -> String {
         match &arguments.scene {
             Some(scene) if scene.path == *path => {
                 for entry in &scene.file.clouds {
-                    let settings = scene.from_here(&entry.settings);
+                    let settings = scene.seen_from_here(&entry.settings);
                     text.push_str(&print::cloud(&scene.resolve(&entry.path), &entry.to_world, &settings));
                 }
             }
@@ -210,7 +210,7 @@ impl Scene {
     }
 
     /// The settings of a cloud, paths not relative to the scene file's folder but as they are from here.
-    fn from_here(&self, settings: &[Setting]) -> Vec<Setting> {
+    fn seen_from_here(&self, settings: &[Setting]) -> Vec<Setting> {
         let command = CloudArguments::command();
         let takes_path =
             |name: &str| command.get_arguments().any(|arg| arg.get_long() == Some(name) && is_path(arg));
