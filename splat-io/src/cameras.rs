@@ -235,8 +235,7 @@ fn check(camera: &Camera, path: &Path) -> Result<(), Error> {
             return Err(Error::invalid(path, Place::Field(field), value.to_string(), "a finite number"));
         }
     }
-    // Whether distortion can be drawn, the renderer says: a camera with one can be read, and looked at.
-    Camera { distortion: None, ..camera.clone() }.check().map_err(Error::core(path))
+    camera.check().map_err(Error::core(path))
 }
 
 /// A matrix that turns, shifts and perhaps scales, or else an error for `field`.
