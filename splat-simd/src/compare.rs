@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Lattice};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
-use crate::raster::{LatticeJob, RasterFrame, RasterJob};
+use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
 use crate::render::set_up;
 use crate::samples::{DistortedSamples, LaneSamples};
@@ -74,9 +74,9 @@ impl<'a> SplatBySplat<'a> {
         let ranks = &[rank as u32];
         let tests = match (method, &self.lattice) {
             (Method::LensPoints, Some(lattice)) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells, target: Target::Records })
             }
-            _ => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
+            _ => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target: Target::Records }),
         };
         self.records.group();
         tests

@@ -16,8 +16,9 @@ mod render;
 mod resolve;
 mod samples;
 mod shade;
+mod surface_sums;
 pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};
 pub use lanes::Level;
-pub use render::{Renderer, render};
+pub use render::{Renderer, render, SUMS, LAYERED, CELLS, TILES};

@@ -18,7 +18,7 @@ pub struct Record {
 
 /// The list that a record belongs to in the lower half, and its splat in the upper.
 #[derive(Debug, Clone, Copy, Default)]
-struct Key(u64);
+pub struct Key(u64);
 
 impl Key {
     #[inline(always)]
@@ -26,8 +26,9 @@ impl Key {
         Self(u64::from(splat.0) << 32 | u64::from(list))
     }
 
+    /// The list.
     #[inline(always)]
-    fn list(self) -> usize {
+    pub fn list(self) -> usize {
         self.0 as u32 as usize
     }
 
@@ -301,6 +302,13 @@ impl Page<'_> {
     #[inline(always)]
     pub fn records(&mut self) -> &mut [Record] {
         &mut self.records[self.first..self.count]
+    }
+
+    /// The records and the lists of the page: for each its cell, in a buffer that keeps fronts and backs together.
+    #[inline(always)]
+    pub fn records_and_cells(&self) -> (&[Record], &[Key]) {
+        let page = self.first..self.count;
+        (&self.records[page.clone()], &self.keys[page])
     }
 
     /// Ends the splat, which has this many fragments.

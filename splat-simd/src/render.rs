@@ -4,11 +4,12 @@ use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Lattice};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
-use crate::raster::{LatticeJob, RasterFrame, RasterJob};
+use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
-use crate::resolve::{ResolveCell, ResolveJob, Surfaces};
+use crate::resolve::{ResolveCell, ResolveJob, SummedSurfaces, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
+use crate::surface_sums::SurfaceSums;
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
 use splat_core::pixel::PixelResolver;
@@ -54,6 +55,7 @@ struct Worker {
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
     over: Over,
+    sums: SurfaceSums,
 }
 
 /// A finished tile.
@@ -295,7 +297,7 @@ impl<'a> Picture<'a> {
         worker.records.forget();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let lattice = self.lattice_for(region, ranks);
-        let tests = self.rasterize(worker, region, ranks, lattice);
+        let tests = self.rasterize(worker, region, ranks, lattice, Mode::Records);
         let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
@@ -316,13 +318,19 @@ impl<'a> Picture<'a> {
         region: &PixelRect,
         ranks: &[u32],
         lattice: Option<&Lattice>,
+        mode: Mode,
     ) -> u64 {
-        let Worker { records, places, distorted, cells, .. } = worker;
+        let Worker { records, places, distorted, cells, sums, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
+        let target = match mode {
+            Mode::Records => Target::Records,
+            Mode::Sums => Target::Sums(sums),
+            Mode::Layered => Target::Layered(sums),
+        };
         match lattice {
-            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
+            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target }),
             Some(lattice) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells, target })
             }
         }
     }
@@ -340,10 +348,31 @@ impl<'a> Picture<'a> {
         let start = Instant::now();
         let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
         let limit = if region.area() > 1 { limit } else { usize::MAX };
-        worker.records.clear(self.samples.groups(), self.two_sided(), limit);
         let lattice = self.lattice_for(region, ranks);
-        let tests = self.rasterize(worker, region, ranks, lattice);
+        let groups = self.samples.groups();
+        let summed = self.sums_surfaces() && SUMS.load(std::sync::atomic::Ordering::Relaxed);
+        let (tests, fragments);
+        if summed {
+            worker.records.clear(groups, false, usize::MAX);
+            worker.records.forget();
+            worker.sums.prepare(groups);
+            tests = self.rasterize(worker, region, ranks, lattice, Mode::Sums);
+            fragments = worker.records.fragments;
+            self.level.run_single(FindLayered(&mut worker.sums, lattice.is_none()));
+            LAYERED.fetch_add(worker.sums.layered_count as u64, std::sync::atomic::Ordering::Relaxed);
+            CELLS.fetch_add((groups*1024) as u64, std::sync::atomic::Ordering::Relaxed);
+            TILES.fetch_add((worker.sums.layered_count>0) as u64, std::sync::atomic::Ordering::Relaxed);
+            worker.records.clear(groups, false, limit);
+            if worker.sums.layered_count > 0 {
+                self.rasterize(worker, region, ranks, lattice, Mode::Layered);
+            }
+        } else {
+            worker.records.clear(groups, self.two_sided(), limit);
+            tests = self.rasterize(worker, region, ranks, lattice, Mode::Records);
+            fragments = worker.records.fragments;
+        }
         if !worker.records.is_complete() {
+            worker.sums.clear();
             statistics.raster += start.elapsed();
             for quarter in quarters(region) {
                 self.region(worker, &quarter, ranks, pixels, film, statistics);
@@ -353,9 +382,15 @@ impl<'a> Picture<'a> {
         worker.records.group();
         statistics.raster += start.elapsed();
         statistics.tests += tests;
-        statistics.fragments += worker.records.fragments;
+        statistics.fragments += fragments;
         let start = Instant::now();
         match self.options.resolve {
+            Resolve::Surface { coverage, .. } if summed => {
+                let mut sums = std::mem::take(&mut worker.sums);
+                let mut cells = SummedSurfaces { coverage, sums: &mut sums };
+                self.resolve_cells(worker, region, lattice, &mut cells, pixels, film);
+                worker.sums = sums;
+            }
             Resolve::Surface { coverage, thickness: Thickness::AroundHit } if few(self.options.aovs) => {
                 if self.cloud.opacities.is_none() {
                     self.resolve_cells(
@@ -385,6 +420,16 @@ impl<'a> Picture<'a> {
             _ => self.resolve_each(worker, region, lattice, pixels, film),
         }
         statistics.resolve += start.elapsed();
+    }
+
+    fn sums_surfaces(&self) -> bool {
+        let surfaces =
+            matches!(self.options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. });
+        surfaces
+            && few(self.options.aovs)
+            && self.cloud.opacities.is_none()
+            && !self.two_sided()
+            && !self.options.material.varies_by_pixel()
     }
 
     /// Whether both sides of a splat can be seen, and are not the same to the resolve.
@@ -468,6 +513,29 @@ impl<'a> Picture<'a> {
             }
         }
     }
+}
+
+struct FindLayered<'a>(&'a mut SurfaceSums, bool);
+impl crate::lanes::Kernel for FindLayered<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: crate::lanes::Lanes>(self) {
+        self.0.find_layered::<L>(self.1);
+    }
+}
+/// experiment
+pub static SUMS: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(true);
+/// experiment
+pub static LAYERED: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
+/// experiment
+pub static CELLS: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
+/// experiment
+pub static TILES: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
+#[derive(Clone, Copy)]
+enum Mode {
+    Records,
+    Sums,
+    Layered,
 }
 
 /// Whether the AOVs need no more of a sample than its colour, transmittance and coverage.
