@@ -74,9 +74,15 @@ impl<'a> SplatBySplat<'a> {
         let ranks = &[rank as u32];
         let tests = match (method, &self.lattice) {
             (Method::LensPoints, Some(lattice)) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells, target: Target::Records })
+                let images = &[lattice.image(&self.frame.set_up.splats[rank])];
+                let target = Target::Records;
+                let job = LatticeJob { frame, lattice, ranks, images, region, records, cells, target };
+                self.level.run_single(job)
             }
-            _ => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target: Target::Records }),
+            _ => {
+                let target = Target::Records;
+                self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target })
+            }
         };
         self.records.group();
         tests

@@ -2,7 +2,7 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
-use crate::lattice::{Apart, CellNumber, Lattice};
+use crate::lattice::{Apart, CellNumber, Image, Lattice};
 use crate::places::{PLACES, PlaceList, TILE};
 use crate::records::{Key, Page, Record, RecordBuffer, cell_of};
 use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
@@ -155,6 +155,8 @@ pub struct LatticeJob<'a> {
     pub lattice: &'a Lattice,
     /// As [`RasterJob::ranks`].
     pub ranks: &'a [u32],
+    /// The image of each of these splats, as [`Lattice::image`] has it.
+    pub images: &'a [Option<Image>],
     /// The pixels; they lie within one tile.
     pub region: PixelRect,
     /// Where the fragments go.
@@ -185,17 +187,17 @@ impl Kernel for LatticeJob<'_> {
 impl LatticeJob<'_> {
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
-        let Self { frame, lattice, ranks, region, records, cells, mut target } = self;
+        let Self { frame, lattice, ranks, images, region, records, cells, mut target } = self;
         let corner = [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)];
         let partial = region.area() < PLACES;
         let mut tests = 0;
-        for (i, &rank) in ranks.iter().enumerate() {
+        for (i, (&rank, image)) in ranks.iter().zip(images).enumerate() {
             if let Some(&next) = ranks.get(i + AHEAD) {
                 prefetch(&frame.splats[next as usize]);
                 prefetch(&frame.surfaces[next as usize]);
             }
             let splat = &frame.splats[rank as usize];
-            lattice.list::<L>(splat, corner, cells);
+            lattice.list::<L>(splat, image.as_ref(), corner, cells);
             if let Target::Layered(sums) = &target {
                 cells.retain(|number| sums.is_layered(number.cell as usize));
             }

@@ -1,7 +1,7 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
-use crate::lanes::{LANES, Level};
-use crate::lattice::{CellNumber, Lattice};
+use crate::lanes::{Kernel, LANES, Lanes, Level};
+use crate::lattice::{CellNumber, Image, Lattice};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
@@ -51,6 +51,7 @@ struct Worker {
     records: RecordBuffer,
     places: PlaceList,
     distorted: DistortedSamples,
+    images: Vec<Option<Image>>,
     cells: Vec<CellNumber>,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
@@ -296,18 +297,21 @@ impl<'a> Picture<'a> {
         worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
         worker.records.forget();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
-        let lattice = self.lattice_for(region, ranks);
+        let lattice = self.lattice_for(region, ranks, &mut worker.images);
         let tests = self.rasterize(worker, region, ranks, lattice, Mode::Records);
         let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 
     /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
-    fn lattice_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&Lattice> {
+    fn lattice_for(&self, region: &PixelRect, ranks: &[u32], images: &mut Vec<Option<Image>>) -> Option<&Lattice> {
         // A lattice's cells spread over the tile, whatever small part of it is asked for.
         let lattice = self.lattice.as_ref().filter(|_| region.area() >= PLACES / 2)?;
         let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
-        let gain: f64 = splats.map(|splat| lattice.gain(splat, region)).sum();
+        images.clear();
+        images.extend(splats.clone().map(|splat| lattice.image(splat)));
+        let gain: f64 =
+            splats.zip(&*images).map(|(splat, image)| lattice.gain(splat, image.as_ref(), region)).sum();
         (gain > 0.0).then_some(lattice)
     }
 
@@ -320,7 +324,7 @@ impl<'a> Picture<'a> {
         lattice: Option<&Lattice>,
         mode: Mode,
     ) -> u64 {
-        let Worker { records, places, distorted, cells, sums, .. } = worker;
+        let Worker { records, places, distorted, images, cells, sums, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
         let target = match mode {
             Mode::Records => Target::Records,
@@ -330,7 +334,7 @@ impl<'a> Picture<'a> {
         match lattice {
             None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target }),
             Some(lattice) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells, target })
+                self.level.run_single(LatticeJob { frame, lattice, ranks, images, region, records, cells, target })
             }
         }
     }
@@ -348,7 +352,7 @@ impl<'a> Picture<'a> {
         let start = Instant::now();
         let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
         let limit = if region.area() > 1 { limit } else { usize::MAX };
-        let lattice = self.lattice_for(region, ranks);
+        let lattice = self.lattice_for(region, ranks, &mut worker.images);
         let groups = self.samples.groups();
         let summed = self.sums_surfaces() && SUMS.load(std::sync::atomic::Ordering::Relaxed);
         let (tests, fragments);
@@ -516,10 +520,10 @@ impl<'a> Picture<'a> {
 }
 
 struct FindLayered<'a>(&'a mut SurfaceSums, bool);
-impl crate::lanes::Kernel for FindLayered<'_> {
+impl Kernel for FindLayered<'_> {
     type Output = ();
     #[inline(always)]
-    fn run<L: crate::lanes::Lanes>(self) {
+    fn run<L: Lanes>(self) {
         self.0.find_layered::<L>(self.1);
     }
 }

@@ -180,25 +180,11 @@ pub fn case(case: Case, cloud: &Cloud, repetitions: usize) -> anyhow::Result<Mea
 pub fn frames(case: Case, count: usize) -> anyhow::Result<String> {
     let cloud = case.subject.cloud()?.with_context(|| case.subject.skipped())?;
     let scene = case.scene(&cloud)?;
-    let reference = Reference::new(&cloud, &case.pinhole().scene(&cloud)?);
-    let mut scalar = Least::default();
-    let mut olds = LevelTimes::new(Level::choose())?;
     let mut times = LevelTimes::new(Level::choose())?;
     let mut fragments = 0;
-    use std::sync::atomic::Ordering::Relaxed;
-    let mut pinhole = 0;
     for _ in 0..count {
-        let start = Instant::now();
-        pinhole = reference.run();
-        scalar.take(start.elapsed());
-        splat_simd::SUMS.store(false, Relaxed);
-        olds.render(&cloud, &scene, 1)?;
-        olds.rasterize(&cloud, &scene)?;
-        splat_simd::SUMS.store(true, Relaxed);
         fragments = times.render(&cloud, &scene, 1)?.fragments;
     }
-    println!("layered cells {} of {}, tiles {}", splat_simd::LAYERED.load(Relaxed) as f64 / count as f64, splat_simd::CELLS.load(Relaxed) as f64/ count as f64, splat_simd::TILES.load(Relaxed) as f64/ count as f64);
-    println!("scalar {:.2}; null {:.2}; old: raster and store {:.2}, resolve {:.2}, both {:.2}, frame {:.2}", scalar.per(pinhole), olds.raster.per(fragments), olds.stored.per(fragments), olds.resolve.per(fragments), olds.both.per(fragments), olds.frame[0].per(fragments));
     Ok(format!(
         "{case} {}: {fragments} fragments; ns a fragment: raster and store {:.2}, resolve {:.2}, both {:.2}, \
          frame {:.2}",
