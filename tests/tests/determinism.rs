@@ -71,9 +71,7 @@ fn shuffled(runs: &[usize], seed: u64) -> Vec<usize> {
     for &count in runs {
         let start = order.len();
         order.extend(start..start + count);
-        for last in (1..count).rev() {
-            order.swap(start + last, start + random.index(last + 1));
-        }
+        random.shuffle(&mut order[start..]);
     }
     order
 }
