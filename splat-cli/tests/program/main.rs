@@ -4,5 +4,6 @@ mod cameras;
 mod clouds;
 mod command_line;
 mod common;
+mod determinism;
 mod real_files;
 mod scenes;
