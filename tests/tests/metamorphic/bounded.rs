@@ -92,6 +92,7 @@ fn an_aperture_that_closes() {
         assert!(wide > 0.01, "{wide}");
         assert!(middle <= tol::CLOSING * wide && narrow <= tol::CLOSING * middle, "{wide} {middle} {narrow}");
         let closed = difference(1e-9);
+        println!("{wide:.4}, {:.3} of it, {:.3} of that; {closed:.1e}", middle / wide, narrow / middle);
         assert!(closed <= tol::CLOSED, "{closed}");
     }
 }
