@@ -261,15 +261,15 @@ pub const BACKGROUND: f64 = 3.01 * EPS32 as f64;
 
 /// What an eighth of a lens's radius leaves of the difference to the pinhole. Differences are of the first order in the radius
 /// (edges move by so much), so it is 1/8 in the limit, and more where edges are blurred over pixels already. Measured:
-/// .15 at most.
+/// .14 at most.
 pub const CLOSING: f64 = 0.3;
 
 /// The mean difference of a lens of 1e-9 to the pinhole: positions move by 1e-8 pixel, less than an f32 has digits for, but
-/// the two forms of section 4 round differently, by some 2^-24 of the colours. Measured: 1e-7.
-pub const CLOSED: f64 = 1e-6;
+/// the two forms of section 4 round differently, by some 2^-24 (6e-8) of the colours. Measured: 1e-10.
+pub const CLOSED: f64 = 1e-7;
 
 /// How far apart two estimates of the same picture may be, in standard deviations. By chance one of 10^6 pairs is; the tests
-/// have some 20, always the same. Measured: 2.5.
+/// have some ten, always the same. Measured: 2.3.
 pub const DEVIATIONS: f64 = 5.0;
 
 /// What those estimates must tell apart: so many pixels to the side, and colours brighter by this.
