@@ -4,6 +4,8 @@
 //! The hashes are kept in `tests/golden/hashes.txt`, so that another machine, system or architecture is held to them too.
 //! `SPLAT_ACCEPT=1 cargo test -p splat-tests --test determinism` keeps those of what is drawn now.
 
+#![expect(clippy::print_stdout, reason = "what is measured, for whoever asks for it")]
+
 use splat_core::film::NO_ID;
 use splat_core::{Film, PixelRect, RenderOptions};
 use splat_simd::{Level, Method, Renderer};

@@ -55,7 +55,7 @@ fn splats_split_into_two_of_half_the_area() {
         scene.options.background = None;
         scene.cloud.areas = Some(random_areas(&scene.cloud, seed));
         let whole = picture(&scene.cloud, &scene.camera, &scene.options);
-        let halved = |i: &usize| i % every == 0;
+        let halved = |i: &usize| i.is_multiple_of(every);
         let count = scene.cloud.len();
         let order: Vec<usize> = (0..count).chain((0..count).filter(halved)).collect();
         let mut split = permuted(&scene.cloud, &order);

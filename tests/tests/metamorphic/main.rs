@@ -3,6 +3,8 @@
 //!
 //! `SPLAT_CASES=N` tries N times as many scenes.
 
+#![expect(clippy::print_stdout, reason = "what is measured, for whoever asks for it")]
+
 mod bounded;
 mod exact;
 mod statistical;
