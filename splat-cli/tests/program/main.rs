@@ -4,5 +4,7 @@ mod cameras;
 mod clouds;
 mod command_line;
 mod common;
+mod diff;
+mod merge;
 mod real_files;
 mod scenes;
