@@ -131,12 +131,12 @@ impl<'a> PixelResolver<'a> {
     /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.
     #[inline(always)]
     pub fn add_colors(&mut self, samples: impl Iterator<Item = SampleColor>) {
-        let mut sums = self.sums;
+        let (mut sums, mut count) = (self.sums, self.samples);
         for sample in samples {
-            self.samples += 1;
+            count += 1;
             sums.add(&sample, &self.aovs);
         }
-        self.sums = sums;
+        (self.sums, self.samples) = (sums, count);
     }
 
     /// A film of which every pixel is as one without fragments, with this many samples each.

@@ -30,6 +30,24 @@ pub fn flip(reference: &[[f32; 3]], test: &[[f32; 3]], width: usize) -> Vec<f32>
     if reference.is_empty() || width == 0 {
         return Vec::new();
     }
+    // In bands, each with the rows around it that filters reach: planes of whole large pictures would take too much memory.
+    let margin = blur_radius().max(feature_radius()) as usize;
+    let height = reference.len() / width;
+    let mut map = Vec::with_capacity(reference.len());
+    for start in (0..height).step_by(BAND) {
+        let end = height.min(start + BAND);
+        let first = start.saturating_sub(margin);
+        let rows = first * width..height.min(end + margin) * width;
+        let of_band = flip_of_band(&reference[rows.clone()], &test[rows], width);
+        map.extend_from_slice(&of_band[(start - first) * width..(end - first) * width]);
+    }
+    map
+}
+
+/// Rows that are compared at once.
+const BAND: usize = 256;
+
+fn flip_of_band(reference: &[[f32; 3]], test: &[[f32; 3]], width: usize) -> Vec<f32> {
     let [reference, test] = [reference, test].map(|picture| Seen::new(picture, width));
     let largest = largest_difference();
     let features = reference.features.iter().zip(&test.features);
@@ -70,10 +88,7 @@ impl Seen {
 }
 
 fn blurred(luminance: &[f64], red_green: &[f64], blue_yellow: &[f64], width: usize) -> Vec<[f64; 3]> {
-    let scales = [LUMINANCE[1], RED_GREEN[1], BLUE_YELLOW[0][1], BLUE_YELLOW[1][1]];
-    let widest = scales.into_iter().fold(0.0, f64::max);
-    let pi_squared = std::f64::consts::PI.powi(2);
-    let radius = (3.0 * (widest / (2.0 * pi_squared)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
+    let (radius, pi_squared) = (blur_radius(), std::f64::consts::PI.powi(2));
     let gaussian = |[a, b]: [f64; 2]| {
         (-radius..=radius).map(move |x| {
             let degrees = f64::from(x) / PIXELS_PER_DEGREE;
@@ -106,10 +121,24 @@ fn blurred(luminance: &[f64], red_green: &[f64], blue_yellow: &[f64], width: usi
         .collect()
 }
 
+/// How far the eye's blur reaches, in pixels: three deviations of the widest Gaussian.
+fn blur_radius() -> i32 {
+    let scales = [LUMINANCE[1], RED_GREEN[1], BLUE_YELLOW[0][1], BLUE_YELLOW[1][1]];
+    let widest = scales.into_iter().fold(0.0, f64::max);
+    (3.0 * (widest / (2.0 * std::f64::consts::PI.powi(2))).sqrt() * PIXELS_PER_DEGREE).ceil() as i32
+}
+
+/// The deviation of the Gaussian of edges and points, in pixels.
+const FEATURE_DEVIATION: f64 = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
+
+/// How far edges and points reach, in pixels.
+fn feature_radius() -> i32 {
+    (3.0 * FEATURE_DEVIATION).ceil() as i32
+}
+
 /// How much of an edge (first derivatives of a Gaussian) and of a point (second ones) each pixel has.
 fn features(luminance: &[f64], width: usize) -> Vec<[f64; 2]> {
-    let deviation = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
-    let radius = (3.0 * deviation).ceil() as i32;
+    let (deviation, radius) = (FEATURE_DEVIATION, feature_radius());
     let kernel = |of: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
         let weight = |x: i32| {
             let x = f64::from(x);
@@ -256,6 +285,16 @@ mod tests {
         let expected = difference * 0.95 / (0.4 * largest_difference());
         let map = flip(&vec![[0.5; 3]; 25], &vec![[0.4; 3]; 25], 5);
         assert!(map.iter().all(|&error| (f64::from(error) - expected).abs() < 1e-6), "{} {expected}", map[0]);
+    }
+
+    #[test]
+    fn bands_leave_no_trace() {
+        let picture = |seed: u32| -> Vec<[f32; 3]> {
+            let noise = |i: u32| ((i + seed).wrapping_mul(2_654_435_761) >> 24) as f32 / 255.0;
+            (0..7 * 600).map(|i| [noise(3 * i), noise(3 * i + 1), noise(3 * i + 2)]).collect()
+        };
+        let (a, b) = (picture(0), picture(99));
+        assert!(flip(&a, &b, 7) == flip_of_band(&a, &b, 7));
     }
 
     #[test]
