@@ -358,10 +358,10 @@ impl<'a> Channel<'a> {
             Values::Scalar(scalars) => self.write_floats(bytes, scalars[start..].iter().copied()),
             Values::Half(halves) => fill(bytes, halves[start..].iter().map(|half| half.to_ne_bytes())),
             Values::High(plane) => {
-                fill(bytes, plane[start..].iter().map(|&value| halves(value)[0].to_ne_bytes()))
+                fill(bytes, plane[start..].iter().map(|&value| halves(value)[0].to_ne_bytes()));
             }
             Values::Low(plane) => {
-                fill(bytes, plane[start..].iter().map(|&value| halves(value)[1].to_ne_bytes()))
+                fill(bytes, plane[start..].iter().map(|&value| halves(value)[1].to_ne_bytes()));
             }
         }
     }

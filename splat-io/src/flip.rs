@@ -74,8 +74,8 @@ impl Seen {
         let opponent: Vec<[f64; 3]> = picture
             .iter()
             .map(|pixel| {
-                let clamped = pixel.map(|value| f64::from(value.max(0.0).min(1.0)));
-                opponent_from_linear(clamped)
+                let clamped = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0).into() };
+                opponent_from_linear(pixel.map(clamped))
             })
             .collect();
         let plane = |component: usize| opponent.iter().map(|pixel| pixel[component]).collect::<Vec<_>>();

@@ -87,7 +87,7 @@ pub struct Pair {
 
 /// A picture as its file has it.
 enum File {
-    Exr(ExrPicture),
+    Exr(Box<ExrPicture>),
     Png([u32; 2], PngDepth, Vec<[u16; 4]>),
 }
 
@@ -95,7 +95,7 @@ impl File {
     fn read(path: &Path) -> anyhow::Result<Self> {
         // The name of what has no name of a picture tells nothing: its first bytes do, and the reader says so.
         Ok(match PictureFormat::from_path(path)? {
-            PictureFormat::Exr => Self::Exr(read_exr(path)?),
+            PictureFormat::Exr => Self::Exr(Box::new(read_exr(path)?)),
             PictureFormat::Png => {
                 let picture = read_png(path)?;
                 Self::Png(picture.size, picture.depth, picture.pixels)
