@@ -328,7 +328,7 @@ fn damaged_files_are_errors() {
     }
     // A header that claims 16384 x 16384 pixels.
     let place = bytes.windows(16).position(|window| window == b"dataWindow\0box2i").unwrap() + 17 + 4;
-    let mut huge = bytes.clone();
+    let mut huge = bytes;
     huge[place + 8..place + 12].copy_from_slice(&(5 + 16_383_i32).to_le_bytes());
     huge[place + 12..place + 16].copy_from_slice(&(3 + 16_383_i32).to_le_bytes());
     assert!(matches!(read(&huge), Err(Error::Invalid { .. })));
