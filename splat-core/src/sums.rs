@@ -318,12 +318,12 @@ mod tests {
             let values: Vec<i128> = (0..samples)
                 .map(|sample| {
                     let x = 0.3 + spread * (sample.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
-                    (f64::from(x) * 2f64.powi(26)) as i128
+                    (f64::from(x) * (1_u64 << 26) as f64) as i128
                 })
                 .collect();
             let (n, sum) = (i128::from(samples), values.iter().sum::<i128>());
             let difference = n * values.iter().map(|x| x * x).sum::<i128>() - sum * sum;
-            let exact = difference as f64 / (n * n * (n - 1)) as f64 / 2f64.powi(52);
+            let exact = difference as f64 / (n * n * (n - 1)) as f64 / (1_u64 << 52) as f64;
             assert!(ulps(found.x, exact as f32) <= 1, "{samples} {spread}: {} {exact}", found.x);
         }
         assert_eq!(sums(0..16, 0.0).variance_of_the_mean(16.0), Vec3::ZERO);
