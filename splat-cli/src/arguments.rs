@@ -6,6 +6,7 @@ use crate::choices::{
     ShadingChoice, TableChoice, TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
+use crate::diff::DiffArguments;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
 use crate::prepare::{PreparationArguments, PrepareArguments};
@@ -44,6 +45,17 @@ pub enum Command {
     Prepare(PrepareArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
+    /// Join crops, tiles and ranges of samples to the picture of one run
+    ///
+    /// Pieces are .exr files of one command line, but for --crop, --tile and --samples. Crops and tiles give the very bits of one
+    /// run, ranges of samples agree with it to 2 units in the last place of a float.
+    Merge(MergeArguments),
+    /// Say how two pictures differ: exit code 0 if they are the same, 1 if not, 2 if they cannot be compared
+    ///
+    /// The same are pictures whose common channels are equal bit for bit, or, if tolerances are given, where all of these
+    /// hold. Of EXR files values are compared as they are; where one picture is a PNG file, the other is compared as the PNG
+    /// file that would be written of it.
+    Diff(DiffArguments),
     /// Render a scene made in code, which shows what the program does
     Demo(DemoArguments),
 }
@@ -92,6 +104,13 @@ impl ReadArguments {
         self.columns = self.columns.take().or_else(|| others.columns.clone());
         self.classes = self.classes.take().or_else(|| others.classes.clone());
     }
+
+    /// The options in words, as the command line has them.
+    pub fn describe(&self) -> String {
+        let columns = self.columns.as_ref().map(|columns| format!(" --columns {}", columns.0.join(",")));
+        let classes = self.classes.as_ref().map(|classes| format!(" --classes {classes}"));
+        columns.into_iter().chain(classes).collect()
+    }
 }
 
 /// Surfels on a mesh: one spacing is then below two pixels where the surface fills a picture of the default size.
@@ -109,6 +128,29 @@ pub struct InfoArguments {
     /// Write JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// `splat merge`.
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// The pieces (.exr), in any order
+    #[arg(required = true, value_name = "PIECE")]
+    pub pieces: Vec<PathBuf>,
+    /// The picture: .exr; or .png, of pieces of floats (--exr-type float)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// The whole is this part of the frame, half open
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = values::crop)]
+    pub crop: Option<PixelRect>,
+    /// Lossless compression of an EXR file [default: that of the pieces]
+    #[arg(long, value_name = "METHOD")]
+    pub exr_compression: Option<CompressionChoice>,
+    /// Bits of a value in a PNG file
+    #[arg(long, value_name = "BITS", default_value = "8")]
+    pub png_depth: PngDepthChoice,
+    /// Say nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// `splat demo`.

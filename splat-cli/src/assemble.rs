@@ -22,6 +22,8 @@ pub struct Assembled {
     pub cloud: Cloud,
     /// One for each input.
     pub reports: Vec<ImportReport>,
+    /// SHA-256 of the images, those of all clouds first.
+    pub image_hashes: Vec<String>,
     /// What the splats are made of.
     pub materials: Materials,
     /// What is shown as colour, in words; empty for the cloud's own.
@@ -63,6 +65,8 @@ pub fn assemble(
     let options = resolve::options(arguments, trained)?;
     note_assumptions(console, &parts, &reports);
 
+    let of_clouds = parts.iter().flat_map(|part| &part.images.hashes);
+    let image_hashes = images.hashes.iter().chain(of_clouds).cloned().collect();
     let alone = parts.iter().any(|part| part.source.is_special())
         || Cloud::differ(parts.iter().map(|part| &part.cloud));
     let (assembled, time) = progress.stage("prepare", |update| {
@@ -79,7 +83,7 @@ pub fn assemble(
     times.prepare = time;
     let (cloud, materials, color) = assembled?;
     crate::inputs::check_usable(&cloud, &reports)?;
-    Ok(Assembled { cloud, reports, materials, color, options })
+    Ok(Assembled { cloud, reports, image_hashes, materials, color, options })
 }
 
 /// Reads all inputs.

@@ -7,9 +7,8 @@ use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::fit::Up;
 use splat_core::prepare::unknown_sizes;
 use splat_core::{Cloud, Kernel, PatternKind, PixelFilter, RenderOptions, Shading, TableMode};
-use std::fmt::Write;
 
-/// The options that tell one picture from another, as the command line has them; samples and seed have
+/// The options that tell one picture from another, as the command line has them; samples, seed and window have
 /// attributes of their own.
 pub fn options(options: &RenderOptions) -> String {
     let filter = match options.filter {
@@ -66,9 +65,6 @@ pub fn options(options: &RenderOptions) -> String {
     );
     if options.cull {
         text.push_str(" --cull");
-    }
-    if let Some(window) = options.window {
-        _ = write!(text, " --crop {},{},{},{}", window.x0, window.y0, window.x1, window.y1);
     }
     text
 }

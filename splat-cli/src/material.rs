@@ -12,7 +12,7 @@ use splat_core::texture::{
     CylinderHeight, CylindricalMapping, ImageTexture, Mapping, PlanarMapping, Pyramid, Sampler,
     SphericalMapping, Texture, UvMapping, Wrap,
 };
-use splat_io::read_pyramid;
+use splat_io::{file_sha256, read_pyramid};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,6 +51,8 @@ pub fn check(arguments: &MaterialArguments) -> Result<(), UsageError> {
 pub struct Images {
     texture: Option<Arc<Pyramid>>,
     environment: Option<Arc<Pyramid>>,
+    /// SHA-256 of their files.
+    pub hashes: Vec<String>,
 }
 
 /// Reads the images; before the clouds, which take longer.
@@ -61,7 +63,9 @@ pub fn read(arguments: &MaterialArguments, console: Console) -> anyhow::Result<I
     let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
     let read =
         |path: &Option<PathBuf>, wrap| path.as_ref().map(|path| image(path, wrap, console)).transpose();
+    let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
     Ok(Images {
+        hashes: files.map(|path| file_sha256(path)).collect::<Result<_, _>>()?,
         texture: read(&arguments.texture, [wrap; 2])?,
         environment: read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?,
     })

@@ -12,7 +12,7 @@ use crate::usage::UsageError;
 use crate::values::ViewDirection;
 use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve, scene};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
-use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, write_picture};
+use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, camera_json, write_picture};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,7 +41,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
-    let Assembled { cloud, reports, materials, color, options } =
+    let Assembled { cloud, reports, image_hashes, materials, color, options } =
         assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
@@ -59,6 +59,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
             arguments,
             cloud: &cloud,
             reports: &reports,
+            image_hashes: &image_hashes,
             color: &color,
             camera,
             options,
@@ -78,6 +79,7 @@ struct Picture<'a> {
     arguments: &'a RenderArguments,
     cloud: &'a Cloud,
     reports: &'a [ImportReport],
+    image_hashes: &'a [String],
     /// What is shown as colour, in words.
     color: &'a str,
     camera: Camera,
@@ -94,7 +96,7 @@ impl Picture<'_> {
         times: &mut Times,
         start: Instant,
     ) -> anyhow::Result<Report> {
-        let Self { arguments, cloud, reports, color, camera, options, path } = self;
+        let Self { arguments, cloud, reports, image_hashes, color, camera, options, path } = self;
         let console = arguments.talk.console();
         let strength = arguments.splats.edl_strength.unwrap_or(1.0);
         let is_edl = arguments.splats.shading == ShadingChoice::Edl;
@@ -103,9 +105,11 @@ impl Picture<'_> {
         } else {
             engine.render(cloud, &camera, &options, progress, console)?
         };
-        let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
+        let hashes = reports.iter().map(|report| &report.sha256).chain(image_hashes);
+        let hashes: Vec<&str> = hashes.map(String::as_str).collect();
         let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;
         in_words += &arguments.preparation.describe();
+        in_words += &arguments.reading.describe();
         if is_edl {
             for lit in ["--shading color", "--shading headlight"] {
                 in_words = in_words.replace(lit, &format!("--shading edl --edl-strength {strength}"));
@@ -150,6 +154,8 @@ pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Me
         seed: Some(options.seed),
         engine: Some(engine.name().to_owned()),
         options: Some(describe::options(options)),
+        camera: camera_json(camera),
+        crop: options.window,
         ..Metadata::default()
     }
 }

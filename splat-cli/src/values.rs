@@ -4,7 +4,7 @@ use glam::DVec3;
 use splat_core::prepare::Outliers;
 use splat_core::{AovSelection, PixelRect};
 use splat_io::mesh::MOST_SURFELS;
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
 
@@ -34,6 +34,12 @@ pub fn share(text: &str) -> Result<f64, String> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns(pub Vec<String>);
 
+/// A number that differences are held against: 0 or more, not necessarily finite.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| *value >= 0.0);
+    value.ok_or_else(|| "expected a number, 0 or more".to_owned())
+}
+
 /// `--columns`.
 pub fn columns(text: &str) -> Result<Columns, String> {
     let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
@@ -51,6 +57,13 @@ pub struct Classes {
     listed: Vec<u8>,
     /// Whether all others are wanted.
     is_except: bool,
+}
+
+impl Display for Classes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let listed: Vec<String> = self.listed.iter().map(ToString::to_string).collect();
+        write!(f, "{}{}", if self.is_except { "!" } else { "" }, listed.join(","))
+    }
 }
 
 impl Classes {
@@ -330,7 +343,7 @@ mod tests {
     use super::*;
 
     /// Checks that each text is refused.
-    fn refused<T: std::fmt::Debug>(parse: impl Fn(&str) -> Result<T, String>, texts: &[&str]) {
+    fn refused<T: fmt::Debug>(parse: impl Fn(&str) -> Result<T, String>, texts: &[&str]) {
         for text in texts {
             assert!(parse(text).is_err(), "{text:?}: {:?}", parse(text));
         }

@@ -1,5 +1,6 @@
 //! The finished picture: colour, alpha and what else was asked for (AOVs).
 
+use crate::sums::SampleSums;
 use glam::{DVec3, Vec3};
 
 /// A half-open rectangle of pixels of the full frame.
@@ -129,6 +130,8 @@ pub struct Film {
     pub samples: Option<Vec<f32>>,
     /// Variance of the mean of the samples' red, green and blue (before the background); zero for one sample.
     pub variance: Option<Vec<Vec3>>,
+    /// What the means were made of, if only a part of the samples was taken: see [`Film::add_samples`].
+    pub sums: Option<SampleSums>,
 }
 
 impl Film {
@@ -149,6 +152,7 @@ impl Film {
             layers: aovs.layers.then(|| vec![0.0; n]),
             samples: aovs.samples.then(|| vec![0.0; n]),
             variance: aovs.variance.then(|| vec![Vec3::ZERO; n]),
+            sums: None,
         }
     }
 
@@ -157,6 +161,9 @@ impl Film {
         fill_with_first(&mut self.rgba);
         if let Some(samples) = &mut self.samples {
             fill_with_first(samples);
+        }
+        for plane in self.sums.iter_mut().flat_map(|sums| &mut sums.planes) {
+            fill_with_first(plane);
         }
     }
 
@@ -173,6 +180,9 @@ impl Film {
         paste_optional(&mut self.layers, part.layers.as_deref(), target);
         paste_optional(&mut self.samples, part.samples.as_deref(), target);
         paste_optional(&mut self.variance, part.variance.as_deref(), target);
+        if let (Some(to), Some(from)) = (&mut self.sums, &part.sums) {
+            to.planes.iter_mut().zip(&from.planes).for_each(|(to, from)| paste(to, from, target));
+        }
     }
 
     /// The part of this film in `window`, which lies within its own.
@@ -197,10 +207,16 @@ impl Film {
             layers: self.layers.as_ref().map(|values| cut(values, whole, window)),
             samples: self.samples.as_ref().map(|values| cut(values, whole, window)),
             variance: self.variance.as_ref().map(|values| cut(values, whole, window)),
+            sums: self.sums.as_ref().map(|sums| SampleSums {
+                samples: sums.samples,
+                ending: sums.ending,
+                aovs: sums.aovs,
+                planes: sums.planes.iter().map(|values| cut(values, whole, window)).collect(),
+            }),
         }
     }
 
-    /// Puts linear red, green, blue, and alpha behind the picture.
+    /// Puts linear red, green, blue, and alpha behind the picture; its sums, which know nothing of it, are gone.
     pub fn put_behind(&mut self, background: [f32; 4]) {
         let [red, green, blue, alpha] = background;
         let behind = [red * alpha, green * alpha, blue * alpha, alpha];
@@ -208,6 +224,7 @@ impl Film {
             let transmittance = 1.0 - rgba[3];
             rgba.iter_mut().zip(behind).for_each(|(value, behind)| *value += transmittance * behind);
         }
+        self.sums = None;
     }
 
     /// Width of the window, in pixels.
@@ -232,8 +249,8 @@ fn fill_with_first<T: Copy>(values: &mut [T]) {
     }
 }
 
-/// Copies a channel of the window `part` into that of the window `whole`, row by row.
-fn paste<T: Copy>(to: &mut [T], from: &[T], (whole, part): (PixelRect, PixelRect)) {
+/// Copies a channel of the window `part` into that of the window `whole`, which contains it, row by row.
+pub fn paste<T: Copy>(to: &mut [T], from: &[T], (whole, part): (PixelRect, PixelRect)) {
     let left = (part.x0 - whole.x0) as usize;
     let top = (part.y0 - whole.y0) as usize;
     for (row, values) in from.chunks_exact(part.width().max(1)).enumerate() {

@@ -24,6 +24,7 @@ pub mod sampling;
 pub mod setup;
 pub mod shade;
 pub mod srgb;
+pub mod sums;
 pub mod texture;
 
 pub use camera::{Camera, Distortion, Lens, Projection};
@@ -36,3 +37,4 @@ pub use options::{RenderOptions, Shading};
 pub use render::{Rendered, Statistics, fragments, render};
 pub use sampling::{PatternKind, PixelFilter};
 pub use shade::{Detail, Environment, Material, Materials, Optics};
+pub use sums::{Ending, SampleSums};

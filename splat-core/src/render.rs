@@ -61,18 +61,20 @@ pub fn render(
     let window = frame.view.window;
     let start = Instant::now();
     let tiles = Tiles::new(&frame.set_up.splats, &window);
+    let mut pixels = PixelResolver::new(
+        cloud,
+        camera,
+        options,
+        &frame.view,
+        &frame.set_up.splats,
+        &frame.set_up.surfaces,
+        &ScalarLookup,
+    );
+    let samples = frame.rasterizer.range().len();
     let mut picture = Picture {
         frame: &frame,
-        film: Film::new([camera.width, camera.height], window, options.aovs),
-        pixels: PixelResolver::new(
-            cloud,
-            camera,
-            options,
-            &frame.view,
-            &frame.set_up.splats,
-            &frame.set_up.surfaces,
-            &ScalarLookup,
-        ),
+        film: pixels.empty_film([camera.width, camera.height], window, samples),
+        pixels,
         buffer: TileBuffer::default(),
         budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
         statistics: frame.statistics(start.elapsed()),

@@ -22,7 +22,7 @@ mod tests;
 mod trained;
 mod transforms;
 
-pub use own::{parse_camera_json, read_camera_json, write_camera_json, write_cameras_json};
+pub use own::{camera_json, parse_camera_json, read_camera_json, write_camera_json, write_cameras_json};
 
 use crate::error::quoted;
 use crate::{Error, Place};

@@ -2,7 +2,7 @@
 
 use crate::{Error, ply};
 use sha2::{Digest, Sha256};
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Reads all of a regular file.
@@ -18,9 +18,24 @@ pub(crate) fn read_whole(path: &Path) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
+/// SHA-256 of a file, in lower-case hexadecimal.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Unsupported`] for what is no regular file.
+pub fn file_sha256(path: &Path) -> Result<String, Error> {
+    let (file, size) = ply::open(path)?;
+    let mut hash = Sha256::new();
+    io::copy(&mut file.take(size), &mut hash).map_err(Error::io(path, "read"))?;
+    Ok(hexadecimal(&hash.finalize()))
+}
+
 /// SHA-256 in lower-case hexadecimal.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The N bytes at a place, if the file has them.

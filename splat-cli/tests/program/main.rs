@@ -5,5 +5,7 @@ mod clouds;
 mod command_line;
 mod common;
 mod determinism;
+mod diff;
+mod merge;
 mod real_files;
 mod scenes;

@@ -1,6 +1,7 @@
 //! OpenEXR. Headers and the places of blocks are read here, with every claim checked; the crate `exr` unpacks single blocks, of
 //! sizes that have been checked.
 
+pub(crate) mod channels;
 mod header;
 
 use super::{Image, check_size, zeros};
@@ -280,7 +281,7 @@ impl<'a> Layout<'a> {
                 (place, [bytes.i32()?, bytes.i32()?] == [0, 0])
             }
             None => {
-                let row = i64::from(bytes.i32()?) - i64::from(self.part.first_row);
+                let row = i64::from(bytes.i32()?) - i64::from(self.part.corner[1]);
                 let lines = self.compression.scan_lines_per_block() as i64;
                 if row.rem_euclid(lines) != 0 {
                     return Err(
