@@ -29,6 +29,7 @@ mod render;
 mod resolve;
 mod scene;
 mod statistics;
+mod strict;
 mod turntable;
 mod usage;
 mod values;

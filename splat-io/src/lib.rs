@@ -35,14 +35,14 @@ mod whole_file;
 
 pub use atomic::AtomicFile;
 pub use cameras::{
-    CameraDefaults, CameraSet, NamedCamera, parse_camera_json, read_camera_json, read_cameras,
+    CameraDefaults, CameraSet, NamedCamera, parse_camera_json, parse_cameras, read_camera_json, read_cameras,
     read_cameras_with, write_camera_json, write_cameras_json,
 };
 pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
 pub use decimals::decimals;
 pub use error::{Error, Place};
 pub use exr_file::{Compression, ExrOptions, write_aov_files, write_exr};
-pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
+pub use import::{ElementReport, Import, ImportReport, Loss, PropertyReport, Usage};
 pub use las::{read_las, read_las_from, write_las};
 pub use mesh::{Mesh, MeshImport, Sampled, read_obj, sample_surface};
 pub use metadata::Metadata;
