@@ -4,5 +4,7 @@ mod cameras;
 mod clouds;
 mod command_line;
 mod common;
+mod damaged;
 mod real_files;
 mod scenes;
+mod strict;
