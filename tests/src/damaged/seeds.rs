@@ -520,7 +520,7 @@ fn cameras() -> Vec<Seed> {
     let start = 2 + lens.len();
     let model = [&(lens.len() as u16).to_le_bytes()[..], &lens, &image].concat();
     vec![
-        text("camera", "json", "camera_json", own.clone(), &own_changes),
+        text("camera", "json", "camera_json", own, &own_changes),
         text("camera_list", "json", "cameras", list, &own_changes[..6]),
         text("transforms", "json", "cameras", transforms, &transform_changes),
         text("open3d", "json", "cameras", parameters, &[("[9,0,0", "[0,0,0"), ("[1,0,0,0,0", "[1,0,0,0")]),

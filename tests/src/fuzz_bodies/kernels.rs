@@ -54,7 +54,7 @@ fn mode(bytes: &mut Bytes<'_>) -> Resolve {
         Coverage::Soft { saturation: bytes.range(0.01, 4.0) as f32 }
     };
     let thickness = bytes.pick(&[Thickness::AroundHit, Thickness::WholeSplat]);
-    if bytes.byte() % 4 == 0 { Resolve::Over } else { Resolve::Surface { coverage, thickness } }
+    if bytes.byte().is_multiple_of(4) { Resolve::Over } else { Resolve::Surface { coverage, thickness } }
 }
 
 /// Footprints and mappings of any numbers.
@@ -157,7 +157,7 @@ fn camera(bytes: &mut Bytes<'_>) -> Camera {
         blades: bytes.pick(&[0, 3, 5]),
     });
     let focal_length = DVec2::new(bytes.range(5.0, 80.0), bytes.range(5.0, 80.0));
-    let projection = if bytes.byte() % 4 == 0 {
+    let projection = if bytes.byte().is_multiple_of(4) {
         Projection::Orthographic { pixels_per_unit: bytes.range(1.0, 30.0) }
     } else {
         Projection::Perspective { focal_length, lens }
@@ -177,7 +177,8 @@ fn options(bytes: &mut Bytes<'_>) -> RenderOptions {
     let start = bytes.below(40) as i32;
     RenderOptions {
         samples: 1 + bytes.below(10) as u32,
-        window: (bytes.byte() % 4 == 0).then(|| PixelRect::new(start, start / 2, start + 9, start + 3)),
+        window: (bytes.byte().is_multiple_of(4))
+            .then(|| PixelRect::new(start, start / 2, start + 9, start + 3)),
         filter: bytes.pick(&[PixelFilter::Box, PixelFilter::Tent, PixelFilter::BlackmanHarris]),
         pattern: bytes.pick(&[PatternKind::Dealt, PatternKind::Sobol]),
         kernel: bytes.pick(&[Kernel::Windowed, Kernel::Gaussian, Kernel::Disc]),
@@ -186,7 +187,7 @@ fn options(bytes: &mut Bytes<'_>) -> RenderOptions {
         resolve: mode(bytes),
         cull: bytes.flag(),
         shading: bytes.pick(&[Shading::Color, Shading::Headlight]),
-        aovs: if bytes.byte() % 8 == 0 { AovSelection::ALL } else { AovSelection::default() },
+        aovs: if bytes.byte().is_multiple_of(8) { AovSelection::ALL } else { AovSelection::default() },
         tile_memory: bytes.pick(&[1, 20_000, 64 << 20]),
         ..RenderOptions::default()
     }

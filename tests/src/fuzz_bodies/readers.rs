@@ -56,10 +56,10 @@ fn draw(cloud: &Cloud, options: &RenderOptions) {
 fn mesh(result: Result<MeshImport, Error>) {
     let Some(MeshImport { mesh, .. }) = value(result) else { return };
     mesh.check().expect("a mesh from a file belongs together");
-    if mesh.triangles.len() <= 1000 {
-        if let Ok(sampled) = sample_surface(&mesh, 16, 0, &mut |_| {}) {
-            assert_eq!(sampled.cloud.check_lengths(), Ok(()));
-        }
+    if mesh.triangles.len() <= 1000
+        && let Ok(sampled) = sample_surface(&mesh, 16, 0, &mut |_| {})
+    {
+        assert_eq!(sampled.cloud.check_lengths(), Ok(()));
     }
 }
 
