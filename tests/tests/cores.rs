@@ -5,7 +5,6 @@
 
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
-use proptest::test_runner::{RngSeed, TestRunner};
 use splat_abuffer::{Coverage, Fragment, MIN_LAYER_WEIGHT, Resolve, Thickness};
 use splat_core::raster::{Form, SamplePlace};
 use splat_core::render::Frame;
@@ -15,6 +14,7 @@ use splat_core::{
     RenderOptions, Shapes, TableMode,
 };
 use splat_simd::{Level, Method, Renderer};
+use splat_tests::cases::{check, factor};
 use splat_tests::hard_scenes::{Facing, Kind, Knowledge, Sheets, adversarial, moved, sheets};
 use splat_tests::random::Random;
 use splat_tests::scenes::{OPAQUE, Scene, golden, jumble, orthographic, pinhole, soft, sphere, with_lens};
@@ -22,33 +22,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 // ---------------------------------------------------------------------------------------------------------
-// Running
-
-/// How many times as many cases are tried.
-fn factor() -> u32 {
-    let given = std::env::var("SPLAT_CASES").ok();
-    given.map_or(1, |text| text.parse().expect("SPLAT_CASES is a whole number"))
-}
-
-/// Runs a property over a strategy: the same cases in every run.
-fn check<S: Strategy>(cases: u32, seed: u64, strategy: S, test: impl Fn(S::Value))
-where
-    S::Value: std::fmt::Debug,
-{
-    let config = ProptestConfig {
-        cases: cases * factor(),
-        rng_seed: RngSeed::Fixed(seed),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    };
-    let run = TestRunner::new(config).run(&strategy, |case| {
-        test(case);
-        Ok(())
-    });
-    if let Err(error) = run {
-        panic!("{error}");
-    }
-}
+// Tallies
 
 /// What was compared: numbers of splat-pixel pairs, of fragments, and of fragments of each sort.
 #[derive(Debug, Default)]

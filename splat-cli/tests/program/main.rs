@@ -5,6 +5,7 @@ mod clouds;
 mod command_line;
 mod common;
 mod damaged;
+mod determinism;
 mod real_files;
 mod scenes;
 mod strict;
