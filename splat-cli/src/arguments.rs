@@ -96,6 +96,9 @@ pub struct ReadArguments {
     /// Only points of these classes, as 2,6 or, all but these, !7,18
     #[arg(long, value_name = "LIST", value_parser = values::classes)]
     pub classes: Option<Classes>,
+    /// Refuse files of which anything would be dropped, skipped or changed, instead of saying how much
+    #[arg(long)]
+    pub strict: bool,
 }
 
 impl ReadArguments {
@@ -103,6 +106,7 @@ impl ReadArguments {
     pub fn fill_in(&mut self, others: &Self) {
         self.columns = self.columns.take().or_else(|| others.columns.clone());
         self.classes = self.classes.take().or_else(|| others.classes.clone());
+        self.strict |= others.strict;
     }
 
     /// The options in words, as the command line has them.
@@ -125,6 +129,9 @@ pub struct InfoArguments {
     /// What the columns of a text file are: see render
     #[arg(long, value_name = "x,y,z,..", value_parser = values::columns, allow_hyphen_values = true)]
     pub columns: Option<Columns>,
+    /// Fail if anything of the file would be dropped, skipped or changed
+    #[arg(long)]
+    pub strict: bool,
     /// Write JSON
     #[arg(long)]
     pub json: bool,

@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
 use crate::usage::UsageError;
-use crate::{colors, describe, output, prepare as preparation, resolve};
+use crate::{colors, describe, output, prepare as preparation, resolve, strict};
 use anyhow::{Context, ensure};
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
@@ -51,7 +51,7 @@ pub fn assemble(
     progress: &Progress,
     times: &mut Times,
 ) -> anyhow::Result<Assembled> {
-    let images = material::read(&arguments.material, console)?;
+    let images = material::read(&arguments.material, arguments.reading.strict, console)?;
     let sources = scene::sources(arguments)?;
     output::spare_inputs(&arguments.picture(), sources.iter().map(|source| &source.path))?;
     ensure!(
@@ -81,8 +81,11 @@ pub fn assemble(
         }
     });
     times.prepare = time;
-    let (cloud, materials, color) = assembled?;
+    let (mut cloud, materials, color) = assembled?;
     crate::inputs::check_usable(&cloud, &reports)?;
+    if arguments.reading.strict {
+        strict::check_complete(&mut cloud, &reports)?;
+    }
     Ok(Assembled { cloud, reports, image_hashes, materials, color, options })
 }
 
@@ -95,7 +98,7 @@ fn read(
     let count = sources.len() as f64;
     let (mut parts, mut reports) = (Vec::new(), Vec::new());
     for (index, source) in sources.into_iter().enumerate() {
-        let images = material::read(&source.settings.material, console)?;
+        let images = material::read(&source.settings.material, source.settings.reading.strict, console)?;
         let reading = Reading::new(Sampling::default(), false, &source.settings.reading);
         let Import { cloud, report } =
             read_one(&source.path, &reading, &mut |done| progress((index as f64 + done) / count))?;

@@ -2,6 +2,7 @@
 
 use crate::arguments::DEFAULT_POINTS;
 use crate::arguments::ReadArguments;
+use crate::strict;
 use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
 use splat_core::Cloud;
@@ -37,13 +38,21 @@ pub struct Reading {
     pub cloud: CloudOptions,
     /// The classes of points that are wanted; `None`: all.
     pub classes: Option<Classes>,
+    /// Whether what would be passed over is an error.
+    pub strict: bool,
 }
 
 impl Reading {
     /// What the options ask for.
     pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments) -> Self {
         let columns = arguments.columns.as_ref().map(|columns| columns.0.clone());
-        Self { sampling, with_faces, cloud: CloudOptions { columns }, classes: arguments.classes.clone() }
+        Self {
+            sampling,
+            with_faces,
+            cloud: CloudOptions { columns },
+            classes: arguments.classes.clone(),
+            strict: arguments.strict,
+        }
     }
 }
 
@@ -67,9 +76,12 @@ pub fn read(
 /// Reads a cloud, or a mesh as a cloud, and picks the classes that are wanted.
 ///
 /// # Errors
-/// What the reader says; a mesh without an area; a cloud without classes.
+/// What the reader says; a mesh without an area; a cloud without classes; what a strict reading refuses.
 pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     let mut import = read_all(path, reading, progress)?;
+    if reading.strict {
+        strict::check_import(&mut import)?;
+    }
     if let Some(classes) = &reading.classes {
         // Class 0 is what was never classified.
         let field = import.cloud.field("classification");
@@ -131,6 +143,8 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
     } else {
         "the normals of vertices tell the outside; splats lie in their triangles".to_owned()
     });
+    report.losses.extend(strict::without_area(&mesh, skipped));
+    report.losses.extend(strict::without_texture(&mesh, without_texture));
     if skipped > 0 {
         report.assumptions.push(format!("{skipped} triangles without an area are skipped"));
     }
@@ -145,8 +159,7 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
 /// # Errors
 /// A sentence that counts the defects.
 pub fn check_usable(cloud: &Cloud, reports: &[ImportReport]) -> anyhow::Result<()> {
-    let names: Vec<String> = reports.iter().map(|report| report.path.display().to_string()).collect();
-    let names = names.join(", ");
+    let names = crate::describe::paths(reports);
     ensure!(!cloud.is_empty(), "{names}: the cloud is empty");
     if (0..cloud.len()).any(|index| cloud.defect(index).is_none()) {
         return Ok(());

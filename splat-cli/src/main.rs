@@ -31,6 +31,7 @@ mod render;
 mod resolve;
 mod scene;
 mod statistics;
+mod strict;
 mod turntable;
 mod usage;
 mod values;

@@ -4,6 +4,7 @@ use crate::arguments::MaterialArguments;
 use crate::choices::MappingChoice;
 use crate::console::Console;
 use crate::usage::UsageError;
+use anyhow::ensure;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use splat_core::Cloud;
 use splat_core::fit::Up;
@@ -58,11 +59,12 @@ pub struct Images {
 /// Reads the images; before the clouds, which take longer.
 ///
 /// # Errors
-/// Images that cannot be read.
-pub fn read(arguments: &MaterialArguments, console: Console) -> anyhow::Result<Images> {
+/// Images that cannot be read, and, to the strict, those with values that are not finite.
+pub fn read(arguments: &MaterialArguments, strict: bool, console: Console) -> anyhow::Result<Images> {
     let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
-    let read =
-        |path: &Option<PathBuf>, wrap| path.as_ref().map(|path| image(path, wrap, console)).transpose();
+    let read = |path: &Option<PathBuf>, wrap| {
+        path.as_ref().map(|path| image(path, wrap, strict, console)).transpose()
+    };
     let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
     Ok(Images {
         hashes: files.map(|path| file_sha256(path)).collect::<Result<_, _>>()?,
@@ -97,10 +99,11 @@ pub fn material(
     Ok(material)
 }
 
-/// Reads an image, and warns of texels that are no numbers.
-fn image(path: &Path, wrap: [Wrap; 2], console: Console) -> anyhow::Result<Arc<Pyramid>> {
+/// Reads an image, and warns of texels that are no numbers, or refuses them.
+fn image(path: &Path, wrap: [Wrap; 2], strict: bool, console: Console) -> anyhow::Result<Arc<Pyramid>> {
     let pyramid = read_pyramid(path, wrap)?;
     if let count @ 1.. = pyramid.replaced() {
+        ensure!(!strict, "{}: --strict: {count} values that are not finite", path.display());
         console.warn(format_args!("{}: values replaced that are not finite: {count}", path.display()));
     }
     Ok(Arc::new(pyramid))

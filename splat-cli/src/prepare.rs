@@ -5,7 +5,7 @@ use crate::choices::{KernelChoice, UpChoice};
 use crate::inputs::{self, Reading, Sampling};
 use crate::progress::Progress;
 use crate::usage::UsageError;
-use crate::{output, resolve, values};
+use crate::{output, resolve, strict, values};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use splat_core::Cloud;
@@ -206,6 +206,9 @@ pub fn run(arguments: &PrepareArguments) -> anyhow::Result<()> {
     };
     let (estimated, _) = progress.stage("prepare", |update| prepare(&mut cloud, &options, update));
     inputs::check_usable(&cloud, &reports)?;
+    if arguments.reading.strict {
+        strict::check_complete(&mut cloud, &reports)?;
+    }
     cloud.remove_outliers();
     let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
     let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));

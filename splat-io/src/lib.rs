@@ -38,8 +38,8 @@ mod whole_file;
 
 pub use atomic::AtomicFile;
 pub use cameras::{
-    CameraDefaults, CameraSet, NamedCamera, camera_json, parse_camera_json, read_camera_json, read_cameras,
-    read_cameras_with, write_camera_json, write_cameras_json,
+    CameraDefaults, CameraSet, NamedCamera, camera_json, parse_camera_json, parse_cameras, read_camera_json,
+    read_cameras, read_cameras_with, write_camera_json, write_cameras_json,
 };
 pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
 pub use decimals::decimals;
@@ -47,7 +47,7 @@ pub use error::{Error, Place};
 pub use exr_file::picture::{ExrPicture, Values, read_exr, write_exr_picture};
 pub use exr_file::{Compression, ExrOptions, write_aov_files, write_exr};
 pub use flip::flip;
-pub use import::{ElementReport, Import, ImportReport, PropertyReport, Usage};
+pub use import::{ElementReport, Import, ImportReport, Loss, PropertyReport, Usage};
 pub use las::{read_las, read_las_from, write_las};
 pub use merge::{MergeError, Piece, merge};
 pub use mesh::{Mesh, MeshImport, Sampled, read_obj, sample_surface};
