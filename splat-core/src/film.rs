@@ -1,5 +1,7 @@
 //! The finished picture: colour, alpha and what else was asked for (AOVs).
 
+use crate::Error;
+use crate::memory::filled;
 use glam::{DVec3, Vec3};
 
 /// A half-open rectangle of pixels of the full frame.
@@ -78,6 +80,14 @@ pub struct AovSelection {
 }
 
 impl AovSelection {
+    /// Bytes that a film takes for each pixel.
+    pub fn bytes_per_pixel(&self) -> usize {
+        let vectors = [self.normal, self.albedo, self.position, self.variance];
+        let scalars = [self.depth, self.id, self.coverage, self.layers, self.samples];
+        let count = |wanted: &[bool]| wanted.iter().filter(|wanted| **wanted).count();
+        size_of::<[f32; 4]>() + count(&vectors) * size_of::<Vec3>() + count(&scalars) * size_of::<f32>()
+    }
+
     /// All of them.
     pub const ALL: Self = Self {
         depth: true,
@@ -94,6 +104,11 @@ impl AovSelection {
 
 /// [`Film::id`] of a pixel in which no sample hits anything.
 pub const NO_ID: u32 = u32::MAX;
+
+/// What errors call a film, and their advice.
+pub(crate) const FILM: &str = "the picture";
+pub(crate) const SMALLER_FILM: &str =
+    "a smaller size, fewer AOVs, or a part at a time (--crop, --tile) need less";
 
 /// A picture, or the window of one.
 ///
@@ -133,23 +148,37 @@ pub struct Film {
 
 impl Film {
     /// An empty film: transparent, nothing hit.
+    ///
+    /// # Panics
+    /// If there is no memory for it: [`Film::try_new`] is for films that may be large.
     pub fn new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Self {
+        Self::try_new(frame, window, aovs).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// An empty film: transparent, nothing hit.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn try_new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Result<Self, Error> {
+        fn channel<T: Clone>(wanted: bool, value: T, count: usize) -> Result<Option<Vec<T>>, Error> {
+            wanted.then(|| filled(FILM, value, count, SMALLER_FILM)).transpose()
+        }
         let n = window.area();
-        Self {
+        Ok(Self {
             frame,
             window,
-            rgba: vec![[0.0; 4]; n],
-            depth: aovs.depth.then(|| vec![f32::INFINITY; n]),
-            normal: aovs.normal.then(|| vec![Vec3::ZERO; n]),
-            albedo: aovs.albedo.then(|| vec![Vec3::ZERO; n]),
-            position: aovs.position.then(|| vec![Vec3::ZERO; n]),
+            rgba: filled(FILM, [0.0; 4], n, SMALLER_FILM)?,
+            depth: channel(aovs.depth, f32::INFINITY, n)?,
+            normal: channel(aovs.normal, Vec3::ZERO, n)?,
+            albedo: channel(aovs.albedo, Vec3::ZERO, n)?,
+            position: channel(aovs.position, Vec3::ZERO, n)?,
             position_origin: DVec3::ZERO,
-            id: aovs.id.then(|| vec![NO_ID; n]),
-            coverage: aovs.coverage.then(|| vec![0.0; n]),
-            layers: aovs.layers.then(|| vec![0.0; n]),
-            samples: aovs.samples.then(|| vec![0.0; n]),
-            variance: aovs.variance.then(|| vec![Vec3::ZERO; n]),
-        }
+            id: channel(aovs.id, NO_ID, n)?,
+            coverage: channel(aovs.coverage, 0.0, n)?,
+            layers: channel(aovs.layers, 0.0, n)?,
+            samples: channel(aovs.samples, 0.0, n)?,
+            variance: channel(aovs.variance, Vec3::ZERO, n)?,
+        })
     }
 
     /// Gives every pixel what the first one holds in the channels where a pixel without fragments is not as a new one.
@@ -157,6 +186,21 @@ impl Film {
         fill_with_first(&mut self.rgba);
         if let Some(samples) = &mut self.samples {
             fill_with_first(samples);
+        }
+    }
+
+    /// What it holds besides colour and alpha.
+    pub fn aovs(&self) -> AovSelection {
+        AovSelection {
+            depth: self.depth.is_some(),
+            normal: self.normal.is_some(),
+            albedo: self.albedo.is_some(),
+            position: self.position.is_some(),
+            id: self.id.is_some(),
+            coverage: self.coverage.is_some(),
+            layers: self.layers.is_some(),
+            samples: self.samples.is_some(),
+            variance: self.variance.is_some(),
         }
     }
 

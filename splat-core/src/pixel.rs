@@ -6,7 +6,7 @@ use crate::sampling::SampleTable;
 use crate::setup::{View, VisibleSplat, shading_normal, splat_color};
 use crate::shade::{Shaded, SplatShader};
 use crate::texture::ImageLookup;
-use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading, srgb};
+use crate::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Shading, srgb};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
 
@@ -157,13 +157,16 @@ impl<'a> PixelResolver<'a> {
     }
 
     /// A film of which every pixel is as one without fragments, with this many samples each.
-    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Film {
-        let mut film = Film::new(frame, window, self.aovs);
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Result<Film, Error> {
+        let mut film = Film::try_new(frame, window, self.aovs)?;
         self.start();
         self.add_colors((0..samples).map(|_| SampleColor::NOTHING));
         self.finish(window.x0, window.y0, &mut film);
         film.repeat_first_pixel();
-        film
+        Ok(film)
     }
 
     /// Adds to the sums what only the AOVs need.

@@ -19,7 +19,10 @@ enum Fault {
     /// So many bytes can be written; the next write takes what fits, the one after fails.
     FullAfter(usize),
     /// A write takes at most so many bytes, and every other one is interrupted before it begins.
-    Short { most: usize, interrupt: bool },
+    Short {
+        most: usize,
+        interrupt: bool,
+    },
     /// The bytes are not made durable.
     Sync,
     /// The temporary cannot take the target's place.
@@ -180,7 +183,8 @@ fn a_picture_of_several_files_is_old_or_new_file_by_file() {
     let write = || write_picture(&path, &film(), &Metadata::default(), &options);
     write().unwrap();
     let files = || -> Vec<(std::path::PathBuf, Vec<u8>)> {
-        let mut paths: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let mut paths: Vec<_> =
+            fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
         paths.sort();
         paths.into_iter().map(|path| (path.clone(), fs::read(path).unwrap())).collect()
     };
