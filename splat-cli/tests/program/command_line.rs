@@ -1,45 +1,13 @@
 //! The program from outside: exit codes, files, messages.
 
+use super::common::{PROGRAM, Png, fails, message_of, read_png, succeeds};
 use glam::{DMat4, DVec2, DVec3};
 use splat_core::{Camera, Cloud, Projection, Shapes};
 use splat_io::{PlyEncoding, write_camera_json, write_ply};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_splat");
-
-/// Runs the program in `folder`.
-fn splat(folder: &Path, arguments: &str) -> Output {
-    Command::new(PROGRAM).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-/// Runs the program, which must succeed.
-fn succeeds(folder: &Path, arguments: &str) -> Output {
-    let output = splat(folder, arguments);
-    assert!(output.status.success(), "splat {arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
-/// Runs the program, which must fail with this code. Returns its message.
-fn fails(folder: &Path, arguments: &str, code: i32) -> String {
-    let output = splat(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "splat {arguments}: {message}");
-    message
-}
-
-/// Width, height and RGBA bytes of a PNG file.
-fn read_png(path: &Path) -> (u32, u32, Vec<[u8; 4]>) {
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
-    decoder.set_transformations(png::Transformations::ALPHA);
-    let mut reader = decoder.read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    let info = reader.next_frame(&mut bytes).unwrap();
-    let pixels = bytes[..info.buffer_size()].chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
-    (info.width, info.height, pixels)
-}
 
 /// An evenly covered sphere of radius 1 at `centre`, with colours.
 fn sphere(centre: DVec3) -> Cloud {
@@ -80,7 +48,7 @@ fn camera(centre: DVec3) -> Camera {
 fn the_demo_needs_nothing() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), "demo -o demo.png --size 160x90 --spp 2");
-    let (width, height, pixels) = read_png(&folder.path().join("demo.png"));
+    let Png { size: [width, height], pixels, .. } = read_png(&folder.path().join("demo.png"));
     assert_eq!((width, height), (160, 90));
     let mut colors = pixels;
     colors.sort_unstable();
@@ -94,7 +62,7 @@ fn a_picture_without_any_option_shows_the_whole_cloud() {
     write_ply(&folder.path().join("in.ply"), &sphere(DVec3::ZERO), PlyEncoding::Binary).unwrap();
     let output = succeeds(folder.path(), "render in.ply -o out.png --stats stats.json");
     assert!(output.stdout.is_empty());
-    let (width, height, pixels) = read_png(&folder.path().join("out.png"));
+    let Png { size: [width, height], pixels, .. } = read_png(&folder.path().join("out.png"));
     let alpha = |x: u32, y: u32| pixels[(y * width + x) as usize][3];
     // The sphere fills the height but for the margin, touches no border, and has no hole.
     assert!((0..width).all(|x| alpha(x, 0) == 0 && alpha(x, height - 1) == 0));
@@ -120,7 +88,7 @@ fn map_coordinates_change_nothing() {
         write_camera_json(&folder.path().join(format!("{name}.json")), &camera(at)).unwrap();
         succeeds(folder.path(), &format!("render {name}.ply -o {name}.png --camera {name}.json"));
     }
-    let [(_, _, near), (_, _, far)] = ["near.png", "far.png"].map(|name| read_png(&folder.path().join(name)));
+    let [near, far] = ["near.png", "far.png"].map(|name| read_png(&folder.path().join(name)).pixels);
     let same = |(a, b): (&[u8; 4], &[u8; 4])| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 2);
     let agree = near.iter().zip(&far).filter(|&pair| same(pair)).count();
     assert!(near.iter().any(|pixel| pixel[3] == 255));
@@ -166,7 +134,7 @@ fn a_prepared_cloud_is_the_same_picture() {
         }
     }
     let output = succeeds(folder.path(), "prepare near.ply -o once.ply --outliers statistical -v");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = message_of(&output);
     assert!(message.contains("1999 points") && message.contains("1 outliers dropped"), "{message}");
 }
 
@@ -177,17 +145,16 @@ fn a_crop_of_a_shaded_picture_is_a_part_of_it() {
     let line = "render in.ply --size 160x120 --spp 4 --shading edl --background 0,0,1";
     succeeds(folder.path(), &format!("{line} -o whole.png"));
     succeeds(folder.path(), &format!("{line} -o part.png --crop 40,30,100,90"));
-    let [(_, _, whole), (width, height, part)] =
-        ["whole.png", "part.png"].map(|name| read_png(&folder.path().join(name)));
-    assert_eq!((width, height), (60, 60));
-    let at = |x: u32, y: u32| whole[((y + 30) * 160 + x + 40) as usize];
-    assert!((0..60).all(|y| (0..60).all(|x| part[(y * 60 + x) as usize] == at(x, y))));
+    let [whole, part] = ["whole.png", "part.png"].map(|name| read_png(&folder.path().join(name)));
+    assert_eq!(part.size, [60, 60]);
+    let at = |x: u32, y: u32| whole.pixels[((y + 30) * 160 + x + 40) as usize];
+    assert!((0..60).all(|y| (0..60).all(|x| part.pixels[(y * 60 + x) as usize] == at(x, y))));
     succeeds(
         folder.path(),
         "render in.ply --size 160x120 --spp 4 --background 0,0,1 -o plain.png --shading headlight",
     );
-    let (_, _, plain) = read_png(&folder.path().join("plain.png"));
-    assert!(plain.iter().zip(&whole).any(|(a, b)| a != b) && plain[0] == whole[0]);
+    let plain = read_png(&folder.path().join("plain.png")).pixels;
+    assert!(plain.iter().zip(&whole.pixels).any(|(a, b)| a != b) && plain[0] == whole.pixels[0]);
     for wrong in ["--shading edl --samples 0:2", "--shading edl --resolve over", "--edl-strength 2"] {
         fails(folder.path(), &format!("render in.ply -o out.png {wrong}"), 2);
     }
@@ -283,7 +250,7 @@ fn a_claim_of_a_billion_points_fails_at_once_in_little_memory() {
             let start = Instant::now();
             let output = Command::new("sh").current_dir(folder.path()).args(["-c", &line]).output().unwrap();
             let time = start.elapsed();
-            let message = String::from_utf8_lossy(&output.stderr);
+            let message = message_of(&output);
             assert_eq!(output.status.code(), Some(1), "{command}: {message}");
             assert!(message.contains("1000000000") && message.contains("vertex"), "{message}");
             assert!(time < Duration::from_millis(100), "{command}: {time:?}");
@@ -324,7 +291,7 @@ fn a_mesh_is_converted_and_both_render_alike() {
     succeeds(folder.path(), &format!("render square.obj -o b.png {options}"));
     let [a, b] = ["a.png", "b.png"].map(|name| read_png(&folder.path().join(name)));
     assert_eq!(a, b);
-    let (width, height, pixels) = a;
+    let Png { size: [width, height], pixels, .. } = a;
     assert_eq!(pixels[(height / 2 * width + width / 2) as usize][3], 255);
 }
 
@@ -352,7 +319,7 @@ fn a_mesh_shows_its_texture_upright_with_every_mapping_and_surroundings() {
     let corners = |options: &str| {
         let line = format!("render square.obj -o out.png --view front --size 64x64 --spp 4 {options}");
         succeeds(folder.path(), &line);
-        let (width, _, pixels) = read_png(&folder.path().join("out.png"));
+        let Png { size: [width, _], pixels, .. } = read_png(&folder.path().join("out.png"));
         [(20, 20), (44, 20), (20, 44), (44, 44)].map(|(x, y)| {
             let [red, green, blue, _] = pixels[y * width as usize + x];
             [red > 128, green > 128, blue > 128]
@@ -453,7 +420,7 @@ fn real_files_are_rendered_or_refused_and_never_a_panic() {
             .args([&output, &path])
             .output()
             .unwrap();
-        let message = String::from_utf8_lossy(&run.stderr);
+        let message = message_of(&run);
         match run.status.code() {
             Some(0) => fs::remove_file(&output).unwrap(),
             Some(1) => {

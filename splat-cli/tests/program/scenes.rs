@@ -1,41 +1,28 @@
 //! Scene files from outside: what they say is drawn, the command line wins, and what is wrong is said with its line.
 
+use super::common::{Png, message_of, read_png, splat, succeeds};
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, Shapes};
 use splat_io::{PlyEncoding, write_ply};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn splat(folder: &Path, arguments: &str) -> Output {
-    let program = env!("CARGO_BIN_EXE_splat");
-    Command::new(program).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
 
 /// What the program wrote to stdout; it must succeed.
 fn stdout(folder: &Path, arguments: &str) -> String {
-    let output = splat(folder, arguments);
-    assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    String::from_utf8(succeeds(folder, arguments).stdout).unwrap()
 }
 
-/// The message of a program that must fail.
+/// The message of a program that must fail: with 1 or 2, by who is to blame.
 fn failure(folder: &Path, arguments: &str) -> String {
     let output = splat(folder, arguments);
-    assert!(!output.status.success(), "{arguments}");
-    String::from_utf8(output.stderr).unwrap()
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{arguments}");
+    message_of(&output)
 }
 
-/// Size and RGBA bytes of a small picture of these inputs.
-fn picture(folder: &Path, arguments: &str) -> ([u32; 2], Vec<u8>) {
-    stdout(folder, &format!("render {arguments} -o out.png --quiet"));
-    let file = fs::File::open(folder.join("out.png")).unwrap();
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
-    decoder.set_transformations(png::Transformations::ALPHA);
-    let mut reader = decoder.read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    let info = reader.next_frame(&mut bytes).unwrap();
-    ([info.width, info.height], bytes[..info.buffer_size()].to_vec())
+/// A small picture of these inputs.
+fn picture(folder: &Path, arguments: &str) -> Png {
+    succeeds(folder, &format!("render {arguments} -o out.png --quiet"));
+    read_png(&folder.join("out.png"))
 }
 
 /// A square of discs in the plane z = 0 around a place, of one colour.
@@ -110,11 +97,8 @@ fn clouds_have_places_and_looks_of_their_own() {
     let scene = "[[cloud]]\npath = \"red.ply\"\ntranslate = [-15, 0, 0]\n\
                  [[cloud]]\npath = \"bare.xyz\"\ntranslate = [15, 0, 0]\ncolor = \"height\"\nopacity = 0.5\n";
     fs::write(folder.join("s.toml"), format!("{scene}{film}")).unwrap();
-    let ([width, height], pixels) = picture(folder, "s.toml");
-    let at = |x: u32, y: u32| -> [u8; 4] {
-        let index = 4 * (y * width + x) as usize;
-        pixels[index..index + 4].try_into().unwrap()
-    };
+    let Png { size: [width, height], pixels, .. } = picture(folder, "s.toml");
+    let at = |x: u32, y: u32| pixels[(y * width + x) as usize];
     assert_eq!(at(width / 4, height / 2), [255, 0, 0, 255]);
     assert_eq!(at(width / 2, height / 2)[3], 0, "a gap");
     let right = at(3 * width / 4, height / 2);
@@ -135,7 +119,7 @@ fn paths_of_a_scene_elsewhere_are_printed_as_they_are_from_here() {
     let folder = folder();
     let folder = folder.path();
     fs::create_dir(folder.join("scenes")).unwrap();
-    stdout(folder, "render red.ply -o scenes/t.png --size 8x8 --quiet");
+    succeeds(folder, "render red.ply -o scenes/t.png --size 8x8 --quiet");
     let scene = "[[cloud]]\npath = \"../red.ply\"\ntexture = \"t.png\"\nmapping = \"planar\"\n\
                  [film]\nsize = \"80x60\"\nspp = 4\n";
     fs::write(folder.join("scenes/s.toml"), scene).unwrap();
@@ -174,7 +158,7 @@ fn what_is_wrong_is_said_with_its_line() {
 fn a_picture_needs_no_name_and_destroys_nothing() {
     let folder = folder();
     let folder = folder.path();
-    stdout(folder, &format!("render red.ply {SMALL} --quiet"));
+    succeeds(folder, &format!("render red.ply {SMALL} --quiet"));
     assert!(folder.join("red.png").exists());
     let said = failure(folder, &format!("render red.ply {SMALL}"));
     assert!(said.contains("red.png exists: name the picture with -o"), "{said}");
@@ -184,7 +168,7 @@ fn a_picture_needs_no_name_and_destroys_nothing() {
 fn clouds_that_convert_cannot_join_are_refused_not_guessed() {
     let folder = folder();
     let folder = folder.path();
-    stdout(folder, "prepare bare.xyz -o ellipses.ply --quiet");
+    succeeds(folder, "prepare bare.xyz -o ellipses.ply --quiet");
     let said = failure(folder, "convert ellipses.ply bare.xyz -o all.ply");
     assert!(said.contains("normals") && !said.contains("panicked"), "{said}");
     // To draw them is no matter: each is completed first.

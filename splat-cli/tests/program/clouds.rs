@@ -1,50 +1,19 @@
 //! Clouds of every format, from outside: converted, described, coloured and rendered.
 
+use super::common::{PROGRAM, Png, fails, message_of, read_png, succeeds};
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, Field};
 use splat_io::srgb::linear_from_srgb8;
 use splat_io::{PlyEncoding, write_ply};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_splat");
-
-/// Runs the program in `folder`.
-fn splat(folder: &Path, arguments: &str) -> Output {
-    Command::new(PROGRAM).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-/// Runs the program, which must succeed. Returns what it said and what it wrote to stdout.
-fn succeeds(folder: &Path, arguments: &str) -> (String, Vec<u8>) {
-    let output = splat(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "splat {arguments}: {message}");
-    (message, output.stdout)
-}
-
-/// Runs the program, which must fail with this code. Returns its message.
-fn fails(folder: &Path, arguments: &str, code: i32) -> String {
-    let output = splat(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(code), "splat {arguments}: {message}");
-    message
-}
-
-/// The samples of a PNG file.
-fn pixels(path: &Path) -> Vec<u8> {
-    let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
-    let mut reader = decoder.read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    reader.next_frame(&mut bytes).unwrap();
-    bytes
-}
-
 /// Renders a small picture and returns its samples.
-fn picture(folder: &Path, arguments: &str) -> Vec<u8> {
+fn picture(folder: &Path, arguments: &str) -> Png {
     succeeds(folder, &format!("render {arguments} -o out.png --size 96x72 --spp 4"));
-    pixels(&folder.join("out.png"))
+    read_png(&folder.join("out.png"))
 }
 
 /// A hill in centimetres, in map coordinates, with 8-bit colours, intensity and two classes.
@@ -84,13 +53,13 @@ fn every_format_gives_the_same_picture() {
     hill(folder.path(), true);
     let expected = picture(folder.path(), "hill.ply");
     for name in ["hill.las", "hill.laz", "hill.xyz", "hill.txt", "hill.asc", "hill.csv"] {
-        let (message, _) = succeeds(folder.path(), &format!("convert hill.ply -o {name}"));
+        let message = message_of(&succeeds(folder.path(), &format!("convert hill.ply -o {name}")));
         assert!(!message.contains("warning"), "{message}");
         assert!(picture(folder.path(), name) == expected, "{name}");
         succeeds(folder.path(), &format!("convert {name} -o again.ply"));
         assert!(picture(folder.path(), "again.ply") == expected, "{name}");
     }
-    let (message, _) = succeeds(folder.path(), "convert hill.ply hill.las -o two.laz -v");
+    let message = message_of(&succeeds(folder.path(), "convert hill.ply hill.las -o two.laz -v"));
     assert!(message.contains("3200 points"), "{message}");
     assert!(fails(folder.path(), "convert hill.ply -o hill.e57", 2).contains(".csv"));
 }
@@ -102,7 +71,7 @@ fn what_a_format_cannot_hold_is_said() {
     cloud.normals = vec![Vec3::Z; cloud.len()];
     cloud.positions[3] = Vec3::NAN;
     write_ply(&folder.path().join("in.ply"), &cloud, PlyEncoding::Binary).unwrap();
-    let (message, _) = succeeds(folder.path(), "convert in.ply -o out.las");
+    let message = message_of(&succeeds(folder.path(), "convert in.ply -o out.las"));
     assert!(message.contains("no place for normals"), "{message}");
     assert!(message.contains("1 points without finite coordinates"), "{message}");
 }
@@ -114,14 +83,16 @@ fn attributes_become_colours() {
     let by_default = picture(folder.path(), "hill.ply");
     assert!(by_default == picture(folder.path(), "hill.ply --color intensity --colormap gray"));
     let colors = ["height", "normal", "class", "classification", "intensity --colormap inferno"];
-    let pictures: Vec<Vec<u8>> =
+    let pictures: Vec<Png> =
         colors.iter().map(|color| picture(folder.path(), &format!("hill.ply --color {color}"))).collect();
     for (i, one) in pictures.iter().enumerate() {
         assert!(*one != by_default && pictures[..i].iter().all(|other| other != one), "{}", colors[i]);
     }
     // Half of the range is the whole map.
-    let (message, _) =
-        succeeds(folder.path(), "render hill.ply -o out.png --size 9x9 --color height --color-range 0:4 -v");
+    let message = message_of(&succeeds(
+        folder.path(),
+        "render hill.ply -o out.png --size 9x9 --color height --color-range 0:4 -v",
+    ));
     assert!(message.contains("colours show the height from 0 to 4 (viridis"), "{message}");
     assert!(fails(folder.path(), "render hill.ply -o out.png --color rgb", 1).contains("no colours"));
     let message = fails(folder.path(), "render hill.ply -o out.png --color time", 1);
@@ -135,8 +106,8 @@ fn classes_are_chosen_and_left_out() {
     let cloud = hill(folder.path(), true);
     let high = cloud.fields[1].values.iter().filter(|&&class| class == 6.0).count();
     for (classes, count) in [("6", high), ("!2", high), ("2,6", cloud.len()), ("!7,18", cloud.len())] {
-        let (message, _) =
-            succeeds(folder.path(), &format!("convert hill.ply -o out.laz --classes {classes}"));
+        let message =
+            message_of(&succeeds(folder.path(), &format!("convert hill.ply -o out.laz --classes {classes}")));
         assert!(message.contains(&format!("{count} points")), "{classes}: {message}");
     }
     assert!(fails(folder.path(), "render hill.ply -o out.png --classes 9", 1).contains("there are 2, 6"));
@@ -163,7 +134,7 @@ fn claims_of_billions_of_points_fail_at_once_in_little_memory() {
         let line = format!("ulimit -v 97656 && exec {PROGRAM} info {name}");
         let start = Instant::now();
         let output = Command::new("sh").current_dir(folder.path()).args(["-c", &line]).output().unwrap();
-        let message = String::from_utf8_lossy(&output.stderr);
+        let message = message_of(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {message}");
         assert!(message.contains("4000000000"), "{message}");
         assert!(start.elapsed() < Duration::from_secs(2), "{name}: {:?}", start.elapsed());
@@ -176,7 +147,7 @@ fn info_tells_columns_fields_and_assumptions() {
     hill(folder.path(), true);
     succeeds(folder.path(), "convert hill.ply -o hill.las");
     let info = |arguments: &str| -> serde_json::Value {
-        serde_json::from_slice(&succeeds(folder.path(), &format!("info --json {arguments}")).1).unwrap()
+        serde_json::from_slice(&succeeds(folder.path(), &format!("info --json {arguments}")).stdout).unwrap()
     };
     let las = info("hill.las");
     assert_eq!(las["format"], "LAS 1.2, point format 2");
@@ -211,7 +182,7 @@ fn real_clouds_are_rendered_or_refused_and_never_a_panic() {
             .args([&output, &path])
             .output()
             .unwrap();
-        let message = String::from_utf8_lossy(&run.stderr);
+        let message = message_of(&run);
         match run.status.code() {
             Some(0) => fs::remove_file(&output).unwrap(),
             Some(1) => {

@@ -2,9 +2,9 @@
 //!
 //! The files are in the folder that `SPLAT_TEST_DATA` names; without it nothing is tested.
 
+use super::common::{fails, read_png, succeeds};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 
 /// A cloud: its file, number of points, and bounds.
 type Fact = (&'static str, u64, Option<[[f64; 3]; 2]>);
@@ -74,31 +74,11 @@ fn data() -> Option<PathBuf> {
     std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
 }
 
-fn splat(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_splat")).current_dir(folder).args(arguments).output().unwrap()
-}
-
-fn succeeds(folder: &Path, arguments: &[&str]) -> Output {
-    let output = splat(folder, arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
-/// Alphas of a PNG file.
-fn alphas(path: &Path) -> Vec<u8> {
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
-    decoder.set_transformations(png::Transformations::ALPHA);
-    let mut reader = decoder.read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    let info = reader.next_frame(&mut bytes).unwrap();
-    bytes[..info.buffer_size()].chunks_exact(4).map(|pixel| pixel[3]).collect()
-}
-
 #[test]
 fn counts_and_bounds_are_those_that_another_program_found() {
     let Some(data) = data() else { return };
     for (file, count, bounds) in CLOUDS {
-        let output = succeeds(&data, &["info", "--json", file]);
+        let output = succeeds(&data, &format!("info --json {file}"));
         let info: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(info["points"], count, "{file}");
         let Some(expected) = bounds else { continue };
@@ -121,8 +101,8 @@ fn every_file_becomes_a_picture_without_any_option() {
     let picture = folder.path().join("out.png");
     let mesh = ("meshes/spot/spot_triangulated.obj", 0, None);
     for (file, ..) in CLOUDS.iter().chain([&mesh]) {
-        succeeds(&data, &["render", file, "-o", picture.to_str().unwrap(), "--size", "160x120", "--quiet"]);
-        let seen = alphas(&picture).iter().filter(|&&alpha| alpha > 0).count();
+        succeeds(&data, &format!("render {file} -o {} --size 160x120 --quiet", picture.display()));
+        let seen = read_png(&picture).pixels.iter().filter(|pixel| pixel[3] > 0).count();
         // Ten points, or four, are dots in an empty picture.
         assert!(seen > 20, "{file}: {seen} pixels show anything");
     }
@@ -132,9 +112,7 @@ fn every_file_becomes_a_picture_without_any_option() {
 fn what_cannot_be_read_is_refused_with_a_reason() {
     let Some(data) = data() else { return };
     for (file, reason) in REFUSED {
-        let output = splat(&data, &["info", file]);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{file}: {message}");
+        let message = fails(&data, &format!("info {file}"), 1);
         assert!(message.contains(file) && message.contains(reason), "{message}");
     }
 }
@@ -143,26 +121,24 @@ fn what_cannot_be_read_is_refused_with_a_reason() {
 fn twins_give_the_same_image_bits() {
     let Some(data) = data() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let pixels = |file: &str, options: &[&str]| {
+    let pixels = |file: &str, options: &str| {
         let picture = folder.path().join("out.exr");
-        let line = ["render", file, "-o", picture.to_str().unwrap(), "--exr-type", "float", "--spp", "4"];
-        succeeds(&data, &[&line, options].concat());
+        let output = picture.display();
+        succeeds(&data, &format!("render {file} -o {output} --exr-type float --spp 4 {options}"));
         // The files differ in the hash of the input only.
         let bytes = std::fs::read(&picture).unwrap();
         let hash = bytes.windows(9).position(|window| window == b"inputHash").unwrap();
         let text = hash + "inputHash\0string\0".len() + 4;
         [&bytes[..text], &bytes[text + 64..]].concat()
     };
-    let las = pixels("clouds/1.2-with-color.las", &[]);
-    assert!(las == pixels("clouds/1.2-with-color.copc.laz", &[]), "LAS and COPC");
-    let text = ["--camera", "cameras/garden_colmap_text", "--frames", "1"];
-    let binary = ["--camera", "cameras/garden_colmap_bin", "--frames", "1"];
+    let las = pixels("clouds/1.2-with-color.las", "");
+    assert!(las == pixels("clouds/1.2-with-color.copc.laz", ""), "LAS and COPC");
+    let text = "--camera cameras/garden_colmap_text --frames 1";
+    let binary = "--camera cameras/garden_colmap_bin --frames 1";
     let [text, binary] =
-        [text, binary].map(|camera| pixels("cameras/garden_colmap_text/points3D.txt", &camera));
+        [text, binary].map(|camera| pixels("cameras/garden_colmap_text/points3D.txt", camera));
     assert!(text == binary, "cameras of COLMAP as text and binary");
-    let points = pixels(
-        "cameras/garden_colmap_bin/points3D.bin",
-        &["--camera", "cameras/garden_colmap_bin", "--frames", "1"],
-    );
+    let points =
+        pixels("cameras/garden_colmap_bin/points3D.bin", "--camera cameras/garden_colmap_bin --frames 1");
     assert!(text == points, "points of COLMAP as text and binary");
 }

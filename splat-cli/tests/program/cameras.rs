@@ -1,51 +1,11 @@
 //! Cameras from outside: formats, frames, turntables and prints to scale.
 
+use super::common::{Png, fails, message_of, read_png, splat, succeeds};
 use glam::DVec3;
 use splat_core::{Cloud, Shapes};
 use splat_io::{PlyEncoding, write_ply};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// Runs the program in `folder`.
-fn splat(folder: &Path, arguments: &str) -> Output {
-    let program = env!("CARGO_BIN_EXE_splat");
-    Command::new(program).current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
-}
-
-/// Runs the program, which must succeed. Returns what it said.
-fn succeeds(folder: &Path, arguments: &str) -> String {
-    let output = splat(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "splat {arguments}: {message}");
-    message
-}
-
-/// Runs the program, which must refuse the command line. Returns its message.
-fn refuses(folder: &Path, arguments: &str) -> String {
-    let output = splat(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "splat {arguments}: {message}");
-    message
-}
-
-/// A decoded PNG: pixels an unit and unit, width, height, pixels of 4 bytes.
-struct Png {
-    density: Option<(u32, u32)>,
-    size: [u32; 2],
-    pixels: Vec<[u8; 4]>,
-}
-
-fn read_png(path: &Path) -> Png {
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
-    decoder.set_transformations(png::Transformations::ALPHA);
-    let mut reader = decoder.read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    let info = reader.next_frame(&mut bytes).unwrap();
-    let pixels = bytes[..info.buffer_size()].chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
-    let density = reader.info().pixel_dims.map(|dims| (dims.xppu, dims.yppu));
-    Png { density, size: [info.width, info.height], pixels }
-}
 
 /// Discs of radius .02 (sigma .01) in planes of constant z, each with a colour.
 fn discs(points: &[(DVec3, [f32; 3])]) -> Cloud {
@@ -69,7 +29,7 @@ fn a_print_is_to_scale_and_says_its_resolution() {
     write_ply(&folder.path().join("in.ply"), &cloud, PlyEncoding::Binary).unwrap();
     let line =
         "render in.ply -o map.png --ortho top --spp 256 --shading color --kernel disc --coverage opaque";
-    let said = succeeds(folder.path(), &format!("{line} --scale 1:200 --dpi 254"));
+    let said = message_of(&succeeds(folder.path(), &format!("{line} --scale 1:200 --dpi 254")));
     // A pixel is 200 * 0.0254 / 254 = 0.02 m; the picture holds both discs.
     assert!(said.contains("1:200 at 254 dpi: 506x256 pixels, 51 x 26 mm; a pixel is 0.020000 m"), "{said}");
     let map = read_png(&folder.path().join("map.png"));
@@ -95,12 +55,12 @@ fn a_print_is_to_scale_and_says_its_resolution() {
     assert!((red - glam::DVec2::new(3.0, 253.0)).abs().max_element() < 0.1, "{red}");
 
     // The unit of the scene changes the number of pixels, and nothing else.
-    let said = succeeds(folder.path(), &format!("{line} --scale 1:200 --dpi 254 --unit cm"));
+    let said = message_of(&succeeds(folder.path(), &format!("{line} --scale 1:200 --dpi 254 --unit cm")));
     assert!(said.contains(" 11x8 pixels"), "{said}");
-    let message = refuses(folder.path(), &format!("{line} --scale 1:1"));
+    let message = fails(folder.path(), &format!("{line} --scale 1:1"), 2);
     assert!(message.contains("beyond the limit of 65536 a side"), "{message}");
     assert!(message.contains("take --scale 1:6 or --dpi 58 ("), "{message}");
-    let message = refuses(folder.path(), &format!("{line} --scale 1:5"));
+    let message = fails(folder.path(), &format!("{line} --scale 1:5"), 2);
     assert!(message.contains("beyond the limit of 268435456 in all"), "{message}");
     succeeds(folder.path(), &format!("{line} --scale 1:5 --crop 0,0,8,8"));
     assert_eq!(read_png(&folder.path().join("map.png")).size, [8, 8]);
@@ -117,7 +77,7 @@ fn a_turntable_numbers_its_pictures_and_parts_are_the_same() {
     let points = [(DVec3::ZERO, RED), (DVec3::X, BLUE), (DVec3::new(0.5, 0.3, -1.0), RED)];
     write_ply(&folder.path().join("in.ply"), &discs(&points), PlyEncoding::Binary).unwrap();
     let line = "render in.ply -o t.png --turntable 4 --size 64x48 --spp 4 --stats stats.json --progress json";
-    let said = succeeds(folder.path(), line);
+    let said = message_of(&succeeds(folder.path(), line));
     assert!(said.contains(r#""frame":3,"frames":4}"#), "{said}");
     let names: Vec<String> = (1..=4).map(|number| format!("t-000{number}.png")).collect();
     let all: Vec<Vec<u8>> = names.iter().map(|name| fs::read(folder.path().join(name)).unwrap()).collect();
@@ -155,7 +115,7 @@ fn one_run_draws_all_cameras_of_a_model() {
     let at = |name: &str| folder.path().join(name);
     write_model(&at("model/sparse/0"));
     let line = "render model --camera model --spp 4";
-    let message = refuses(folder.path(), &format!("{line} -o out.png"));
+    let message = fails(folder.path(), &format!("{line} -o out.png"), 2);
     assert!(message.contains("2 cameras (left/a.jpg, right/b.jpg): choose with --camera-name"), "{message}");
     succeeds(folder.path(), &format!("{line} -o {{name}}.png"));
     let [a, b] = ["a.png", "b.png"].map(|name| fs::read(at(name)).unwrap());
@@ -166,7 +126,7 @@ fn one_run_draws_all_cameras_of_a_model() {
     assert_eq!(fs::read(at("two-02.png")).unwrap(), b);
     succeeds(folder.path(), &format!("{line} -o large.png --frames 1 --size 128x96"));
     assert_eq!(read_png(&at("large.png")).size, [128, 96]);
-    let message = refuses(folder.path(), &format!("{line} -o large.png --frames 1 --size 128x90"));
+    let message = fails(folder.path(), &format!("{line} -o large.png --frames 1 --size 128x90"), 2);
     assert!(message.contains("has not the shape of the camera's picture, 64x48: 128x96 would"), "{message}");
     let info = splat(folder.path(), "info model");
     let info = String::from_utf8(info.stdout).unwrap();
