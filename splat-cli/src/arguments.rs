@@ -1,5 +1,6 @@
 //! The command line as it is written: raw options, before anything is known of the cloud.
 
+use crate::checkpoint::CheckpointArguments;
 use crate::choices::{
     ColorMapChoice, CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice,
     FilterChoice, KernelChoice, MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice,
@@ -171,6 +172,9 @@ pub struct RenderArguments {
     /// What is written.
     #[command(flatten, next_help_heading = "Output")]
     pub outputs: OutputArguments,
+    /// When checkpoints are made and used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub checkpoint: CheckpointArguments,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,

@@ -1,5 +1,6 @@
 //! `--shading edl`: a picture, shaded by its own depths.
 
+use crate::checkpoint::Checkpoint;
 use crate::console::Console;
 use crate::engine::Engine;
 use crate::progress::Progress;
@@ -16,6 +17,7 @@ pub fn render(
     camera: &Camera,
     options: &RenderOptions,
     strength: f64,
+    checkpoint: Option<&mut Checkpoint<'_>>,
     progress: &Progress,
     console: Console,
 ) -> anyhow::Result<Rendered> {
@@ -26,7 +28,7 @@ pub fn render(
         aovs: AovSelection { depth: true, ..options.aovs },
         ..options.clone()
     };
-    let mut rendered = engine.render(cloud, camera, &with_depth, progress, console)?;
+    let mut rendered = engine.render(cloud, camera, &with_depth, checkpoint, progress, console)?;
     eye_dome::shade(&mut rendered.film, camera, strength)?;
     if let Some(window) = options.window {
         rendered.film = rendered.film.part(window);

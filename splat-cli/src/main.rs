@@ -8,6 +8,7 @@
 mod arguments;
 mod assemble;
 mod cameras;
+mod checkpoint;
 mod choices;
 mod colors;
 mod console;

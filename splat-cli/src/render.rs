@@ -3,6 +3,7 @@
 use crate::arguments::{MaterialArguments, OutputArguments, RenderArguments};
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
+use crate::checkpoint::{Checkpoint, Checkpoints};
 use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
@@ -49,23 +50,37 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let count = shots.len();
     let mut statistics = Vec::with_capacity(count);
+    let checkpoints = Checkpoints::new(arguments, &reports);
+    let mut sequence = (count > 1).then(|| checkpoints.of_sequence()).transpose()?;
     for (number, shot) in (1..).zip(shots) {
         let camera = shot.camera.or_else(|| Some(fitted.as_ref()?.camera(shot.index)));
         let camera = camera.expect("a shot has a camera, or there is a fitted one");
         let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
         let options = RenderOptions { material: materials.clone(), ..options };
         options.check()?;
+        if sequence.as_ref().is_some_and(|sequence| sequence.has(&shot.output, &camera)) {
+            console.summary(format_args!("{}: complete already", shot.output.display()));
+            continue;
+        }
+        let mut checkpoint = checkpoints.of(&shot.output, &camera);
         let picture = Picture {
             arguments,
             cloud: &cloud,
             reports: &reports,
             color: &color,
-            camera,
+            camera: camera.clone(),
             options,
-            path: shot.output,
+            path: shot.output.clone(),
         };
         let progress = progress.frame(number, count);
-        statistics.push(picture.make(&mut engine, &progress, &mut times, start)?);
+        statistics.push(picture.make(&mut engine, &mut checkpoint, &progress, &mut times, start)?);
+        checkpoint.remove();
+        if let Some(sequence) = &mut sequence {
+            sequence.add(shot.output, camera);
+        }
+    }
+    if let Some(sequence) = sequence {
+        sequence.remove();
     }
     if let Some(path) = &arguments.outputs.stats {
         statistics::write(&statistics, path)?;
@@ -90,6 +105,7 @@ impl Picture<'_> {
     fn make(
         self,
         engine: &mut Engine,
+        checkpoint: &mut Checkpoint<'_>,
         progress: &Progress,
         times: &mut Times,
         start: Instant,
@@ -99,9 +115,9 @@ impl Picture<'_> {
         let strength = arguments.splats.edl_strength.unwrap_or(1.0);
         let is_edl = arguments.splats.shading == ShadingChoice::Edl;
         let rendered = if is_edl {
-            eye_dome::render(engine, cloud, &camera, &options, strength, progress, console)?
+            eye_dome::render(engine, cloud, &camera, &options, strength, Some(checkpoint), progress, console)?
         } else {
-            engine.render(cloud, &camera, &options, progress, console)?
+            engine.render(cloud, &camera, &options, Some(checkpoint), progress, console)?
         };
         let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
         let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;

@@ -7,6 +7,7 @@ use splat_io::mesh::MOST_SURFELS;
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
+use std::time::Duration;
 
 /// Exactly N values with `separator` between them, spaces around each allowed.
 fn split<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
@@ -23,6 +24,13 @@ fn number(text: &str, expected: impl Display, accepted: impl Fn(f64) -> bool) ->
 /// A finite number greater than 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text, "a finite number greater than 0", |value| value.is_finite() && value > 0.0)
+}
+
+/// A time in seconds; 0 is allowed.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    const MOST: f64 = 1e9;
+    number(text, "a number of seconds, 0 or more", |value| (0.0..=MOST).contains(&value))
+        .map(Duration::from_secs_f64)
 }
 
 /// A share of the whole.
