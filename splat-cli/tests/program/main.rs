@@ -1,8 +1,10 @@
 //! The program from outside, one file a subject.
 
 mod cameras;
+mod checkpoints;
 mod clouds;
 mod command_line;
 mod common;
+mod faults;
 mod real_files;
 mod scenes;
