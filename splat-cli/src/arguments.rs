@@ -9,6 +9,7 @@ use crate::choices::{
 use crate::console::Console;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
+use crate::memory::Memory;
 use crate::prepare::{PreparationArguments, PrepareArguments};
 use crate::scene::Scene;
 use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
@@ -70,6 +71,9 @@ pub struct ConvertArguments {
     /// How files are read.
     #[command(flatten)]
     pub reading: ReadArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -110,6 +114,9 @@ pub struct InfoArguments {
     /// Write JSON
     #[arg(long)]
     pub json: bool,
+    /// How much memory may be used.
+    #[command(flatten)]
+    pub memory: Memory,
 }
 
 /// `splat demo`.
@@ -175,6 +182,9 @@ pub struct RenderArguments {
     /// When checkpoints are made and used.
     #[command(flatten, next_help_heading = "Program")]
     pub checkpoint: CheckpointArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,

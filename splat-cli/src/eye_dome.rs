@@ -25,6 +25,8 @@ pub fn render(
     let with_depth = RenderOptions {
         window: options.window.map(|window| eye_dome::with_margin(window, frame)),
         background: None,
+        // The part that is asked for is cut out of what has the margin.
+        memory: if options.memory == usize::MAX { usize::MAX } else { options.memory / 2 },
         aovs: AovSelection { depth: true, ..options.aovs },
         ..options.clone()
     };

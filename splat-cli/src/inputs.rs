@@ -2,6 +2,7 @@
 
 use crate::arguments::DEFAULT_POINTS;
 use crate::arguments::ReadArguments;
+use crate::memory::Memory;
 use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
 use splat_core::Cloud;
@@ -37,13 +38,21 @@ pub struct Reading {
     pub cloud: CloudOptions,
     /// The classes of points that are wanted; `None`: all.
     pub classes: Option<Classes>,
+    /// How much memory may be used.
+    pub memory: Memory,
 }
 
 impl Reading {
     /// What the options ask for.
-    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments) -> Self {
+    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments, memory: Memory) -> Self {
         let columns = arguments.columns.as_ref().map(|columns| columns.0.clone());
-        Self { sampling, with_faces, cloud: CloudOptions { columns }, classes: arguments.classes.clone() }
+        Self {
+            sampling,
+            with_faces,
+            cloud: CloudOptions { columns },
+            classes: arguments.classes.clone(),
+            memory,
+        }
     }
 }
 
@@ -60,7 +69,11 @@ pub fn read(
         read_one(path, reading, &mut |done| progress((index as f64 + done) / paths.len() as f64))
     };
     let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
-    let (clouds, reports) = imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    let (clouds, reports): (Vec<Cloud>, _) =
+        imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    if clouds.len() > 1 {
+        reading.memory.check_copy(&clouds)?;
+    }
     Ok((Cloud::join(clouds)?, reports))
 }
 
@@ -86,6 +99,7 @@ pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -
             path.display(),
             classes_of(&import.cloud)
         );
+        reading.memory.check_copy([&import.cloud])?;
         import.cloud = import.cloud.only(&kept);
     }
     Ok(import)
@@ -108,10 +122,13 @@ fn classes_of(cloud: &Cloud) -> String {
 /// Reads a cloud, or a mesh as a cloud.
 fn read_all(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     if is_obj(path) {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_obj(path)?, reading.sampling, progress)
     } else if reading.with_faces && cloud_format(path)? == CloudFormat::Ply && ply_has_faces(path)? {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_ply_mesh(path)?, reading.sampling, progress)
     } else {
+        reading.memory.check_file(path, None)?;
         Ok(read_cloud(path, &reading.cloud)?)
     }
 }

@@ -23,6 +23,7 @@ mod inputs;
 mod interrupt;
 mod map;
 mod material;
+mod memory;
 mod output;
 mod prepare;
 mod progress;

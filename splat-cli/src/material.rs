@@ -3,6 +3,7 @@
 use crate::arguments::MaterialArguments;
 use crate::choices::MappingChoice;
 use crate::console::Console;
+use crate::memory::Memory;
 use crate::usage::UsageError;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use splat_core::Cloud;
@@ -57,10 +58,11 @@ pub struct Images {
 ///
 /// # Errors
 /// Images that cannot be read.
-pub fn read(arguments: &MaterialArguments, console: Console) -> anyhow::Result<Images> {
+pub fn read(arguments: &MaterialArguments, memory: Memory, console: Console) -> anyhow::Result<Images> {
     let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
-    let read =
-        |path: &Option<PathBuf>, wrap| path.as_ref().map(|path| image(path, wrap, console)).transpose();
+    let read = |path: &Option<PathBuf>, wrap| {
+        path.as_ref().map(|path| image(path, wrap, memory, console)).transpose()
+    };
     Ok(Images {
         texture: read(&arguments.texture, [wrap; 2])?,
         environment: read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?,
@@ -94,7 +96,8 @@ pub fn material(
 }
 
 /// Reads an image, and warns of texels that are no numbers.
-fn image(path: &Path, wrap: [Wrap; 2], console: Console) -> anyhow::Result<Arc<Pyramid>> {
+fn image(path: &Path, wrap: [Wrap; 2], memory: Memory, console: Console) -> anyhow::Result<Arc<Pyramid>> {
+    memory.check_image(path)?;
     let pyramid = read_pyramid(path, wrap)?;
     if let count @ 1.. = pyramid.replaced() {
         console.warn(format_args!("{}: values replaced that are not finite: {count}", path.display()));

@@ -1,6 +1,6 @@
 //! `splat render`: clouds in, a picture out.
 
-use crate::arguments::{MaterialArguments, OutputArguments, RenderArguments};
+use crate::arguments::{MaterialArguments, RenderArguments};
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
 use crate::checkpoint::{Checkpoint, Checkpoints};
@@ -50,13 +50,15 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let count = shots.len();
     let mut statistics = Vec::with_capacity(count);
+    let mut memory = None;
     let checkpoints = Checkpoints::new(arguments, &reports);
     let mut sequence = (count > 1).then(|| checkpoints.of_sequence()).transpose()?;
     for (number, shot) in (1..).zip(shots) {
         let camera = shot.camera.or_else(|| Some(fitted.as_ref()?.camera(shot.index)));
         let camera = camera.expect("a shot has a camera, or there is a fitted one");
         let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
-        let options = RenderOptions { material: materials.clone(), ..options };
+        let memory = *memory.get_or_insert_with(|| arguments.memory.for_rendering(camera.width, &options));
+        let options = RenderOptions { material: materials.clone(), memory, ..options };
         options.check()?;
         if sequence.as_ref().is_some_and(|sequence| sequence.has(&shot.output, &camera)) {
             console.summary(format_args!("{}: complete already", shot.output.display()));
@@ -139,9 +141,8 @@ impl Picture<'_> {
             pixels_per_inch: arguments.camera.map.dpi(),
             ..metadata(&camera, &options, engine)
         };
-        let (written, time) = progress.stage("write", |_| {
-            write_picture(&path, &rendered.film, &metadata, &picture_options(&arguments.outputs))
-        });
+        let (written, time) = progress
+            .stage("write", |_| write_picture(&path, &rendered.film, &metadata, &picture_options(arguments)));
         times.write = time;
         written?;
         times.total = start.elapsed();
@@ -170,12 +171,14 @@ pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Me
     }
 }
 
-fn picture_options(arguments: &OutputArguments) -> PictureOptions {
+fn picture_options(arguments: &RenderArguments) -> PictureOptions {
+    let RenderArguments { outputs: arguments, memory, .. } = arguments;
     PictureOptions {
         exr: ExrOptions {
             full_floats: arguments.exr_type == ExrTypeChoice::Float,
             compression: arguments.exr_compression.into(),
-            ..ExrOptions::default()
+            // Each processor would have some lines at hand.
+            parallel: !memory.is_limited(),
         },
         png_depth: arguments.png_depth.into(),
         separate_aovs: arguments.aov_files,

@@ -33,6 +33,21 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         .map(Duration::from_secs_f64)
 }
 
+/// A size of memory: bytes, or with K, M, G or T those times powers of 1024.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let (number, shift) = match text.char_indices().last() {
+        Some((end, unit)) if unit.is_ascii_alphabetic() => {
+            let shift = "KMGT".find(unit.to_ascii_uppercase()).map(|power| 10 * (power + 1));
+            (&text[..end], shift)
+        }
+        _ => (text, Some(0)),
+    };
+    let value: Option<f64> = number.trim().parse().ok().filter(|value| (0.0..=1e15).contains(value));
+    let bytes = value.zip(shift).map(|(value, shift)| (value * (1u64 << shift) as f64) as u64);
+    bytes.filter(|&bytes| bytes > 0).ok_or_else(|| "expected a size as 512M or 2G".to_owned())
+}
+
 /// A share of the whole.
 pub fn share(text: &str) -> Result<f64, String> {
     number(text, "a number from 0 to 1", |value| (0.0..=1.0).contains(&value))

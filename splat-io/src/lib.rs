@@ -18,6 +18,7 @@ pub mod exr_file;
 pub mod import;
 pub mod las;
 mod lines;
+pub mod memory;
 pub mod mesh;
 pub mod metadata;
 pub mod pcd;

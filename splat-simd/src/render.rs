@@ -283,8 +283,9 @@ impl<'a> Picture<'a> {
     ) -> Self {
         let (images, level) = (&renderer.images, renderer.level);
         // Buffers grow by doubling: one that is nearly full may take twice its use, and once more while it moves.
-        let share =
-            (memory.left() / renderer.threads()).saturating_sub(WORKER_BYTES * options.samples as usize) / 3;
+        let films = 2 * TILES_A_REPORT * PLACES * options.aovs.bytes_per_pixel();
+        let others = WORKER_BYTES * options.samples as usize + films;
+        let share = (memory.left() / renderer.threads()).saturating_sub(others) / 3;
         let samples = LaneSamples::new(&frame.rasterizer);
         // Of a cell of a lattice every sample lies in another pixel.
         let by_pixel = options.material.varies_by_pixel();
