@@ -466,7 +466,7 @@ mod tests {
                     --light 30,-10 --texture t.png --mapping planar --texture-wrap clamp --texture-filter \
                     trilinear --max-anisotropy 8 --texture-detail splat --environment e.exr --reflect \
                     --exr-type float --exr-compression piz --columns x,y,z,- --classes !7,18 --color height \
-                    --colormap inferno --color-range -1:2.5";
+                    --colormap inferno --color-range -1:2.5 --resume --checkpoint 0.5 --max-memory 1.5g";
         let arguments = render(line).unwrap();
         assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
         assert_eq!(arguments.samples.samples, Some(0..4));
@@ -520,6 +520,11 @@ mod tests {
             assert_eq!(render(line).unwrap_err(), ErrorKind::MissingRequiredArgument, "{line}");
         }
         for line in ["--size 0x4", "--focus 0", "--aov z", "--wsat 0", "--radius-scale 0", "--view 1"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
+        }
+        for line in
+            ["--max-memory 0", "--max-memory 2Q", "--max-memory M", "--max-memory -1", "--checkpoint x"]
+        {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }
         for line in ["--up x", "--filter sinc", "--engine gpu"] {

@@ -176,7 +176,12 @@ impl Checkpoint<'_> {
             return Ok(None);
         }
         let frame = [self.camera.width, self.camera.height];
-        let empty = Film::try_new(frame, View::new(&self.camera, options).window, options.aovs)?;
+        let window = View::new(&self.camera, options).window;
+        if window.area().saturating_mul(options.aovs.bytes_per_pixel()) > options.memory {
+            // It is refused at once, by whom knows the words.
+            return Ok(None);
+        }
+        let empty = Film::try_new(frame, window, options.aovs)?;
         match read_checkpoint(&self.path, &self.all.identity(&self.camera)?, empty) {
             Ok(unfinished) => Ok(Some(unfinished)),
             Err(error @ Error::Invalid { .. }) => {

@@ -10,7 +10,7 @@ use crate::resolve::{ResolveCell, ResolveJob, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
 use rayon::prelude::*;
-use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
+use splat_abuffer::{Fragment, Resolve, SampleColor, SplatSurface, Thickness};
 use splat_core::memory::Budget;
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
@@ -35,6 +35,12 @@ const TILES_A_REPORT: usize = 16;
 
 /// At most so many bytes a sample of a pixel take the buffers of a thread besides the records.
 const WORKER_BYTES: usize = 32 << 10;
+
+/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, and what its fragments share.
+const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>());
+
+/// The same for its shader.
+const SHADED_BYTES: usize = 1024;
 
 /// A renderer that keeps its threads and buffers from picture to picture.
 #[derive(Debug)]
@@ -158,6 +164,7 @@ impl Renderer {
         let start = Instant::now();
         let tiles = Tiles::new(&frame.set_up.splats, &window, &mut memory)?;
         let mut statistics = frame.statistics(start.elapsed());
+        self.take_lists(&tiles, options, &mut memory)?;
         let picture = Picture::new(cloud, camera, options, &frame, self, memory);
         let (size, samples) = ([camera.width, camera.height], frame.rasterizer.range().len());
         let mut made = match begun {
@@ -225,6 +232,15 @@ impl Renderer {
         Ok(statistics)
     }
 
+    /// Sets memory aside for what each thread keeps of the splats of a tile.
+    fn take_lists(&self, tiles: &Tiles, options: &RenderOptions, memory: &mut Budget) -> Result<(), Error> {
+        const HELP: &str = "fewer threads (--threads) or a larger size, of which tiles show less, need less";
+        let longest = (0..tiles.len()).map(|tile| tiles.get(tile).1.len()).max().unwrap_or(0);
+        let shader = if options.material.varies_by_pixel() { SHADED_BYTES } else { 0 };
+        let bytes = longest.saturating_mul(LISTED_BYTES + shader).saturating_mul(self.threads());
+        memory.take("the list of a tile's splats on all threads", bytes, HELP)
+    }
+
     /// What is ready before the first fragment; in the memory of the last picture.
     fn frame(&mut self, cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> Result<Frame, Error> {
         let memory = std::mem::take(&mut self.set_up);
@@ -282,10 +298,11 @@ impl<'a> Picture<'a> {
         memory: Budget,
     ) -> Self {
         let (images, level) = (&renderer.images, renderer.level);
-        // Buffers grow by doubling: one that is nearly full may take twice its use, and once more while it moves.
+        // A splat may need as much as is there, and buffers grow by doubling: they may take four times their use, and once more
+        // while they move.
         let films = 2 * TILES_A_REPORT * PLACES * options.aovs.bytes_per_pixel();
         let others = WORKER_BYTES * options.samples as usize + films;
-        let share = (memory.left() / renderer.threads()).saturating_sub(others) / 3;
+        let share = (memory.left() / renderer.threads()).saturating_sub(others) / 5;
         let samples = LaneSamples::new(&frame.rasterizer);
         // Of a cell of a lattice every sample lies in another pixel.
         let by_pixel = options.material.varies_by_pixel();

@@ -6,5 +6,6 @@ mod clouds;
 mod command_line;
 mod common;
 mod faults;
+mod memory;
 mod real_files;
 mod scenes;
