@@ -146,7 +146,7 @@ fn checkpoints_of_other_pictures_are_refused_and_damaged_ones_are_not_used() {
     }
     let damages: [&dyn Fn(&mut Vec<u8>); 4] =
         [&|bytes| bytes.truncate(1000), &|bytes| bytes.clear(), &|bytes| bytes[2000] ^= 1, &|bytes| {
-            bytes.push(0)
+            bytes.extend([0])
         }];
     for damage in damages {
         let mut damaged = bytes.clone();

@@ -1,5 +1,7 @@
 //! Disks that are full, folders that are closed, runs that are killed: every file is the old one or the new one.
 
+#![expect(clippy::print_stdout, reason = "what cannot be tested here is said")]
+
 use super::common::{PROGRAM, fails, message_of, succeeds};
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, Shapes};
