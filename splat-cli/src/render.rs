@@ -116,11 +116,10 @@ impl Picture<'_> {
         let console = arguments.talk.console();
         let strength = arguments.splats.edl_strength.unwrap_or(1.0);
         let is_edl = arguments.splats.shading == ShadingChoice::Edl;
-        let rendered = if is_edl {
-            eye_dome::render(engine, cloud, &camera, &options, strength, Some(checkpoint), progress, console)?
-        } else {
-            engine.render(cloud, &camera, &options, Some(checkpoint), progress, console)?
-        };
+        let mut render =
+            |options: &_| engine.render(cloud, &camera, options, Some(checkpoint), progress, console);
+        let rendered =
+            if is_edl { eye_dome::render(&camera, &options, strength, render)? } else { render(&options)? };
         let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
         let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;
         in_words += &arguments.preparation.describe();
