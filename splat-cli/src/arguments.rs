@@ -1,5 +1,6 @@
 //! The command line as it is written: raw options, before anything is known of the cloud.
 
+use crate::checkpoint::CheckpointArguments;
 use crate::choices::{
     ColorMapChoice, CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice,
     FilterChoice, KernelChoice, MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice,
@@ -9,6 +10,7 @@ use crate::console::Console;
 use crate::diff::DiffArguments;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
+use crate::memory::Memory;
 use crate::prepare::{PreparationArguments, PrepareArguments};
 use crate::scene::Scene;
 use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
@@ -81,6 +83,9 @@ pub struct ConvertArguments {
     /// How files are read.
     #[command(flatten)]
     pub reading: ReadArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -135,6 +140,9 @@ pub struct InfoArguments {
     /// Write JSON
     #[arg(long)]
     pub json: bool,
+    /// How much memory may be used.
+    #[command(flatten)]
+    pub memory: Memory,
 }
 
 /// `splat merge`.
@@ -220,6 +228,12 @@ pub struct RenderArguments {
     /// What is written.
     #[command(flatten, next_help_heading = "Output")]
     pub outputs: OutputArguments,
+    /// When checkpoints are made and used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub checkpoint: CheckpointArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -501,7 +515,7 @@ mod tests {
                     --light 30,-10 --texture t.png --mapping planar --texture-wrap clamp --texture-filter \
                     trilinear --max-anisotropy 8 --texture-detail splat --environment e.exr --reflect \
                     --exr-type float --exr-compression piz --columns x,y,z,- --classes !7,18 --color height \
-                    --colormap inferno --color-range -1:2.5";
+                    --colormap inferno --color-range -1:2.5 --resume --checkpoint 0.5 --max-memory 1.5g";
         let arguments = render(line).unwrap();
         assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
         assert_eq!(arguments.samples.samples, Some(0..4));
@@ -555,6 +569,11 @@ mod tests {
             assert_eq!(render(line).unwrap_err(), ErrorKind::MissingRequiredArgument, "{line}");
         }
         for line in ["--size 0x4", "--focus 0", "--aov z", "--wsat 0", "--radius-scale 0", "--view 1"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
+        }
+        for line in
+            ["--max-memory 0", "--max-memory 2Q", "--max-memory M", "--max-memory -1", "--checkpoint x"]
+        {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }
         for line in ["--up x", "--filter sinc", "--engine gpu"] {

@@ -4,6 +4,7 @@ use crate::arguments::{CloudArguments, RenderArguments};
 use crate::console::Console;
 use crate::inputs::{Reading, Sampling, read_one};
 use crate::material::{self, Images};
+use crate::memory::Memory;
 use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
@@ -51,14 +52,15 @@ pub fn assemble(
     progress: &Progress,
     times: &mut Times,
 ) -> anyhow::Result<Assembled> {
-    let images = material::read(&arguments.material, arguments.reading.strict, console)?;
+    let strict = arguments.reading.strict;
+    let images = material::read(&arguments.material, strict, arguments.memory, console)?;
     let sources = scene::sources(arguments)?;
     output::spare_inputs(&arguments.picture(), sources.iter().map(|source| &source.path))?;
     ensure!(
         !sources.is_empty(),
         UsageError::new("the scene file has no [[cloud]]: there is nothing to draw")
     );
-    let (read, time) = progress.stage("read", |update| read(sources, console, update));
+    let (read, time) = progress.stage("read", |update| read(sources, arguments.memory, console, update));
     times.read = time;
     let (mut parts, reports) = read?;
     let trained = parts.iter().all(|part| part.cloud.trained || part.cloud.is_empty());
@@ -76,6 +78,9 @@ pub fn assemble(
             for part in &mut parts {
                 part.cloud.place(&part.source.to_world);
             }
+            if parts.len() > 1 {
+                arguments.memory.check_copy(parts.iter().map(|part| &part.cloud))?;
+            }
             let cloud = Cloud::join(parts.into_iter().map(|part| part.cloud).collect())?;
             together(cloud, images, arguments, &options, console, update)
         }
@@ -92,14 +97,16 @@ pub fn assemble(
 /// Reads all inputs.
 fn read(
     sources: Vec<Source>,
+    memory: Memory,
     console: Console,
     progress: &mut dyn FnMut(f64),
 ) -> anyhow::Result<(Vec<Part>, Vec<ImportReport>)> {
     let count = sources.len() as f64;
     let (mut parts, mut reports) = (Vec::new(), Vec::new());
     for (index, source) in sources.into_iter().enumerate() {
-        let images = material::read(&source.settings.material, source.settings.reading.strict, console)?;
-        let reading = Reading::new(Sampling::default(), false, &source.settings.reading);
+        let strict = source.settings.reading.strict;
+        let images = material::read(&source.settings.material, strict, memory, console)?;
+        let reading = Reading::new(Sampling::default(), false, &source.settings.reading, memory);
         let Import { cloud, report } =
             read_one(&source.path, &reading, &mut |done| progress((index as f64 + done) / count))?;
         parts.push(Part { source, cloud, images });
@@ -129,6 +136,7 @@ fn together(
     let up = resolve::up(&arguments.camera, &cloud);
     let choice = colors::choose(&cloud, &arguments.splats.colors)?;
     let missing = estimates(arguments, options, up);
+    arguments.memory.check_preparation(&cloud, &missing)?;
     let estimated = prepare(&mut cloud, &missing, progress);
     if let Some(text) = preparation::in_words(&estimated, &missing) {
         console.note(text);
@@ -161,6 +169,7 @@ fn one_by_one(
         let up = resolve::up(&arguments.camera, &cloud);
         let mut missing = estimates(arguments, options, up);
         missing.size_scale *= radius_scale;
+        arguments.memory.check_preparation(&cloud, &missing)?;
         let estimated = prepare(&mut cloud, &missing, &mut |done| progress((index as f64 + done) / count));
         if let Some(text) = preparation::in_words(&estimated, &missing) {
             console.note(format_args!("{}: {text}", path.display()));
@@ -182,6 +191,9 @@ fn one_by_one(
             if is_own { (material, images) } else { (&arguments.material, shared.clone()) };
         runs.push((cloud.len(), material::material(material, images, &cloud, up).with_context(context)?));
         clouds.push(cloud);
+    }
+    if clouds.len() > 1 {
+        arguments.memory.check_copy(&clouds)?;
     }
     Ok((Cloud::join(clouds)?, Materials::of_runs(runs), color))
 }

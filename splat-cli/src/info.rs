@@ -17,9 +17,11 @@ pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
         let summary = camera::Summary::read(&arguments.file)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else if inputs::is_obj(&arguments.file) {
+        arguments.memory.check_file(&arguments.file, Some(0))?;
         let summary = mesh::Summary::read(&arguments.file, arguments.strict)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else {
+        arguments.memory.check_file(&arguments.file, None)?;
         let summary = cloud::Summary::read(&arguments.file, arguments.columns.as_ref(), arguments.strict)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     };

@@ -2,6 +2,7 @@
 
 use crate::arguments::DEFAULT_POINTS;
 use crate::arguments::ReadArguments;
+use crate::memory::Memory;
 use crate::strict;
 use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
@@ -40,11 +41,13 @@ pub struct Reading {
     pub classes: Option<Classes>,
     /// Whether what would be passed over is an error.
     pub strict: bool,
+    /// How much memory may be used.
+    pub memory: Memory,
 }
 
 impl Reading {
     /// What the options ask for.
-    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments) -> Self {
+    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments, memory: Memory) -> Self {
         let columns = arguments.columns.as_ref().map(|columns| columns.0.clone());
         Self {
             sampling,
@@ -52,6 +55,7 @@ impl Reading {
             cloud: CloudOptions { columns },
             classes: arguments.classes.clone(),
             strict: arguments.strict,
+            memory,
         }
     }
 }
@@ -69,7 +73,11 @@ pub fn read(
         read_one(path, reading, &mut |done| progress((index as f64 + done) / paths.len() as f64))
     };
     let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
-    let (clouds, reports) = imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    let (clouds, reports): (Vec<Cloud>, _) =
+        imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    if clouds.len() > 1 {
+        reading.memory.check_copy(&clouds)?;
+    }
     Ok((Cloud::join(clouds)?, reports))
 }
 
@@ -98,6 +106,7 @@ pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -
             path.display(),
             classes_of(&import.cloud)
         );
+        reading.memory.check_copy([&import.cloud])?;
         import.cloud = import.cloud.only(&kept);
     }
     Ok(import)
@@ -120,10 +129,13 @@ fn classes_of(cloud: &Cloud) -> String {
 /// Reads a cloud, or a mesh as a cloud.
 fn read_all(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     if is_obj(path) {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_obj(path)?, reading.sampling, progress)
     } else if reading.with_faces && cloud_format(path)? == CloudFormat::Ply && ply_has_faces(path)? {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_ply_mesh(path)?, reading.sampling, progress)
     } else {
+        reading.memory.check_file(path, None)?;
         Ok(read_cloud(path, &reading.cloud)?)
     }
 }

@@ -8,6 +8,7 @@
 mod arguments;
 mod assemble;
 mod cameras;
+mod checkpoint;
 mod choices;
 mod colors;
 mod console;
@@ -23,6 +24,7 @@ mod inputs;
 mod interrupt;
 mod map;
 mod material;
+mod memory;
 mod merge;
 mod output;
 mod prepare;

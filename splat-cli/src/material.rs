@@ -3,6 +3,7 @@
 use crate::arguments::MaterialArguments;
 use crate::choices::MappingChoice;
 use crate::console::Console;
+use crate::memory::Memory;
 use crate::usage::UsageError;
 use anyhow::ensure;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
@@ -59,11 +60,16 @@ pub struct Images {
 /// Reads the images; before the clouds, which take longer.
 ///
 /// # Errors
-/// Images that cannot be read, and, to the strict, those with values that are not finite.
-pub fn read(arguments: &MaterialArguments, strict: bool, console: Console) -> anyhow::Result<Images> {
+/// Images that cannot be read, or take too much memory, and, to the strict, those with values that are not finite.
+pub fn read(
+    arguments: &MaterialArguments,
+    strict: bool,
+    memory: Memory,
+    console: Console,
+) -> anyhow::Result<Images> {
     let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
     let read = |path: &Option<PathBuf>, wrap| {
-        path.as_ref().map(|path| image(path, wrap, strict, console)).transpose()
+        path.as_ref().map(|path| image(path, wrap, strict, memory, console)).transpose()
     };
     let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
     Ok(Images {
@@ -100,7 +106,14 @@ pub fn material(
 }
 
 /// Reads an image, and warns of texels that are no numbers, or refuses them.
-fn image(path: &Path, wrap: [Wrap; 2], strict: bool, console: Console) -> anyhow::Result<Arc<Pyramid>> {
+fn image(
+    path: &Path,
+    wrap: [Wrap; 2],
+    strict: bool,
+    memory: Memory,
+    console: Console,
+) -> anyhow::Result<Arc<Pyramid>> {
+    memory.check_image(path)?;
     let pyramid = read_pyramid(path, wrap)?;
     if let count @ 1.. = pyramid.replaced() {
         ensure!(!strict, "{}: --strict: {count} values that are not finite", path.display());

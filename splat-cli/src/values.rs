@@ -7,6 +7,7 @@ use splat_io::mesh::MOST_SURFELS;
 use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
+use std::time::Duration;
 
 /// Exactly N values with `separator` between them, spaces around each allowed.
 fn split<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
@@ -23,6 +24,28 @@ fn number(text: &str, expected: impl Display, accepted: impl Fn(f64) -> bool) ->
 /// A finite number greater than 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text, "a finite number greater than 0", |value| value.is_finite() && value > 0.0)
+}
+
+/// A time in seconds; 0 is allowed.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    const MOST: f64 = 1e9;
+    number(text, "a number of seconds, 0 or more", |value| (0.0..=MOST).contains(&value))
+        .map(Duration::from_secs_f64)
+}
+
+/// A size of memory: bytes, or with K, M, G or T those times powers of 1024.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let (number, shift) = match text.char_indices().last() {
+        Some((end, unit)) if unit.is_ascii_alphabetic() => {
+            let shift = "KMGT".find(unit.to_ascii_uppercase()).map(|power| 10 * (power + 1));
+            (&text[..end], shift)
+        }
+        _ => (text, Some(0)),
+    };
+    let value: Option<f64> = number.trim().parse().ok().filter(|value| (0.0..=1e15).contains(value));
+    let bytes = value.zip(shift).map(|(value, shift)| (value * (1u64 << shift) as f64) as u64);
+    bytes.filter(|&bytes| bytes > 0).ok_or_else(|| "expected a size as 512M or 2G".to_owned())
 }
 
 /// A share of the whole.

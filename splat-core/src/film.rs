@@ -1,6 +1,8 @@
 //! The finished picture: colour, alpha and what else was asked for (AOVs).
 
-use crate::sums::SampleSums;
+use crate::memory::filled;
+use crate::sums::{Ending, SampleSums};
+use crate::{Error, RenderOptions};
 use glam::{DVec3, Vec3};
 
 /// A half-open rectangle of pixels of the full frame.
@@ -79,6 +81,14 @@ pub struct AovSelection {
 }
 
 impl AovSelection {
+    /// Bytes that a film takes for each pixel.
+    pub fn bytes_per_pixel(&self) -> usize {
+        let vectors = [self.normal, self.albedo, self.position, self.variance];
+        let scalars = [self.depth, self.id, self.coverage, self.layers, self.samples];
+        let count = |wanted: &[bool]| wanted.iter().filter(|wanted| **wanted).count();
+        size_of::<[f32; 4]>() + count(&vectors) * size_of::<Vec3>() + count(&scalars) * size_of::<f32>()
+    }
+
     /// All of them.
     pub const ALL: Self = Self {
         depth: true,
@@ -95,6 +105,11 @@ impl AovSelection {
 
 /// [`Film::id`] of a pixel in which no sample hits anything.
 pub const NO_ID: u32 = u32::MAX;
+
+/// What errors call a film, and their advice.
+pub(crate) const FILM: &str = "the picture";
+pub(crate) const SMALLER_FILM: &str =
+    "a smaller size, fewer AOVs, or a part at a time (--crop, --tile) need less";
 
 /// A picture, or the window of one.
 ///
@@ -136,24 +151,51 @@ pub struct Film {
 
 impl Film {
     /// An empty film: transparent, nothing hit.
+    ///
+    /// # Panics
+    /// If there is no memory for it: [`Film::try_new`] is for films that may be large.
     pub fn new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Self {
+        Self::try_new(frame, window, aovs).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// An empty film: transparent, nothing hit.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn try_new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Result<Self, Error> {
+        fn channel<T: Clone>(wanted: bool, value: T, count: usize) -> Result<Option<Vec<T>>, Error> {
+            wanted.then(|| filled(FILM, value, count, SMALLER_FILM)).transpose()
+        }
         let n = window.area();
-        Self {
+        Ok(Self {
             frame,
             window,
-            rgba: vec![[0.0; 4]; n],
-            depth: aovs.depth.then(|| vec![f32::INFINITY; n]),
-            normal: aovs.normal.then(|| vec![Vec3::ZERO; n]),
-            albedo: aovs.albedo.then(|| vec![Vec3::ZERO; n]),
-            position: aovs.position.then(|| vec![Vec3::ZERO; n]),
+            rgba: filled(FILM, [0.0; 4], n, SMALLER_FILM)?,
+            depth: channel(aovs.depth, f32::INFINITY, n)?,
+            normal: channel(aovs.normal, Vec3::ZERO, n)?,
+            albedo: channel(aovs.albedo, Vec3::ZERO, n)?,
+            position: channel(aovs.position, Vec3::ZERO, n)?,
             position_origin: DVec3::ZERO,
-            id: aovs.id.then(|| vec![NO_ID; n]),
-            coverage: aovs.coverage.then(|| vec![0.0; n]),
-            layers: aovs.layers.then(|| vec![0.0; n]),
-            samples: aovs.samples.then(|| vec![0.0; n]),
-            variance: aovs.variance.then(|| vec![Vec3::ZERO; n]),
+            id: channel(aovs.id, NO_ID, n)?,
+            coverage: channel(aovs.coverage, 0.0, n)?,
+            layers: channel(aovs.layers, 0.0, n)?,
+            samples: channel(aovs.samples, 0.0, n)?,
+            variance: channel(aovs.variance, Vec3::ZERO, n)?,
             sums: None,
+        })
+    }
+
+    /// An empty film for a picture with these options: with sums, if they take a part of the samples.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn for_picture(frame: [u32; 2], window: PixelRect, options: &RenderOptions) -> Result<Self, Error> {
+        let mut film = Self::try_new(frame, window, options.aovs)?;
+        if options.takes_part_of_samples() {
+            let samples = options.sample_range().len() as u32;
+            film.sums = Some(SampleSums::new(samples, Ending::of(options), &window, options.aovs)?);
         }
+        Ok(film)
     }
 
     /// Gives every pixel what the first one holds in the channels where a pixel without fragments is not as a new one.
@@ -164,6 +206,21 @@ impl Film {
         }
         for plane in self.sums.iter_mut().flat_map(|sums| &mut sums.planes) {
             fill_with_first(plane);
+        }
+    }
+
+    /// What it holds besides colour and alpha.
+    pub fn aovs(&self) -> AovSelection {
+        AovSelection {
+            depth: self.depth.is_some(),
+            normal: self.normal.is_some(),
+            albedo: self.albedo.is_some(),
+            position: self.position.is_some(),
+            id: self.id.is_some(),
+            coverage: self.coverage.is_some(),
+            layers: self.layers.is_some(),
+            samples: self.samples.is_some(),
+            variance: self.variance.is_some(),
         }
     }
 

@@ -5,11 +5,11 @@ use crate::raster::SamplePlace;
 use crate::sampling::SampleTable;
 use crate::setup::{View, VisibleSplat, shading_normal, splat_color};
 use crate::shade::{Shaded, SplatShader};
-use crate::sums::{Ending, SampleSums, Sums};
+use crate::sums::{Ending, Sums};
 use crate::texture::ImageLookup;
-use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading};
+use crate::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Shading};
 use glam::{DMat3, DVec2, DVec3};
-use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
+use splat_abuffer::{Fragment, Resolver, SampleColor, SplatSurface};
 
 /// Resolves the samples of one pixel after the other.
 ///
@@ -23,8 +23,7 @@ pub struct PixelResolver<'a> {
     aovs: AovSelection,
     shading: Shading,
     ending: Ending,
-    /// Whether the film keeps its sums, since the rest of the samples is to be added.
-    keeps_sums: bool,
+    options: &'a RenderOptions,
     resolver: Resolver,
     splats: &'a [VisibleSplat],
     surfaces: &'a [SplatSurface],
@@ -67,11 +66,8 @@ impl<'a> PixelResolver<'a> {
             to_world: camera.linear().inverse(),
             aovs: options.aovs,
             shading: options.shading,
-            ending: Ending {
-                background: options.background,
-                display_space: options.resolve == Resolve::Over,
-            },
-            keeps_sums: options.sample_range() != (0..options.samples),
+            ending: Ending::of(options),
+            options,
             resolver: Resolver::new(options.resolve),
             surfaces,
             shader: needs_shader.then(|| SplatShader::new(cloud, view, options, images)),
@@ -140,16 +136,16 @@ impl<'a> PixelResolver<'a> {
     }
 
     /// A film of which every pixel is as one without fragments, with this many samples each.
-    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Film {
-        let mut film = Film::new(frame, window, self.aovs);
-        if self.keeps_sums {
-            film.sums = Some(SampleSums::new(samples as u32, self.ending, &window, self.aovs));
-        }
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Result<Film, Error> {
+        let mut film = Film::for_picture(frame, window, self.options)?;
         self.start();
         self.add_colors((0..samples).map(|_| SampleColor::NOTHING));
         self.finish(window.x0, window.y0, &mut film);
         film.repeat_first_pixel();
-        film
+        Ok(film)
     }
 
     /// Adds to the sums what only the AOVs need.

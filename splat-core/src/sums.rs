@@ -4,10 +4,11 @@
 //! ([`Film::add_samples`]) that one run would have made, but for the order in which numbers were added. What could come near
 //! zero by cancellation is kept in a form in which that order does not matter.
 
-use crate::film::NO_ID;
-use crate::{AovSelection, Error, Film, PixelRect, srgb};
+use crate::film::{FILM, NO_ID, SMALLER_FILM};
+use crate::memory::filled;
+use crate::{AovSelection, Error, Film, PixelRect, RenderOptions, srgb};
 use glam::{DVec3, Vec3};
-use splat_abuffer::SampleColor;
+use splat_abuffer::{Resolve, SampleColor};
 
 /// What is summed over the samples of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,6 +36,13 @@ pub struct Ending {
     pub background: Option<[f32; 4]>,
     /// Whether colours are summed as the display has them, in sRGB, and become linear only then.
     pub display_space: bool,
+}
+
+impl Ending {
+    /// That of a picture.
+    pub fn of(options: &RenderOptions) -> Self {
+        Self { background: options.background, display_space: options.resolve == Resolve::Over }
+    }
 }
 
 impl Sums {
@@ -219,9 +227,17 @@ fn needed(aovs: AovSelection) -> impl Iterator<Item = &'static Plane> {
 
 impl SampleSums {
     /// Sums of a film of this window and these AOVs, to which nothing was added yet; `samples` is what will be.
-    pub fn new(samples: u32, ending: Ending, window: &PixelRect, aovs: AovSelection) -> Self {
-        let planes = needed(aovs).map(|_| vec![0.0; window.area()]).collect();
-        Self { samples, ending, aovs, planes }
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn new(samples: u32, ending: Ending, window: &PixelRect, aovs: AovSelection) -> Result<Self, Error> {
+        let planes = needed(aovs).map(|_| filled(FILM, 0.0, window.area(), SMALLER_FILM));
+        Ok(Self { samples, ending, aovs, planes: planes.collect::<Result<_, _>>()? })
+    }
+
+    /// Bytes that they take for each pixel.
+    pub fn bytes_per_pixel(aovs: AovSelection) -> usize {
+        needed(aovs).count() * size_of::<f64>()
     }
 
     /// The names of the planes of a film with these AOVs.
@@ -337,7 +353,7 @@ mod tests {
         let film = |range: std::ops::Range<u32>, spread| {
             let mut film = Film::new([1, 1], window, AovSelection::ALL);
             let count = range.len() as u32;
-            film.sums = Some(SampleSums::new(count, ending, &window, AovSelection::ALL));
+            film.sums = Some(SampleSums::new(count, ending, &window, AovSelection::ALL).unwrap());
             let mut sums = sums(range.clone(), spread);
             sums.visible = f64::from(count);
             sums.finish(count, &ending, 0, &mut film);
@@ -369,7 +385,7 @@ mod tests {
         let ending = Ending { background: None, display_space: false };
         let film = |window, aovs| {
             let mut film = Film::new([4, 4], window, aovs);
-            film.sums = Some(SampleSums::new(1, ending, &window, aovs));
+            film.sums = Some(SampleSums::new(1, ending, &window, aovs).unwrap());
             film
         };
         let none = AovSelection::default();

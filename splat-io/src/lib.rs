@@ -8,6 +8,7 @@
 
 pub mod atomic;
 pub mod cameras;
+pub mod checkpoint;
 pub mod cloud_file;
 #[cfg(test)]
 mod damage;
@@ -18,6 +19,7 @@ pub mod flip;
 pub mod import;
 pub mod las;
 mod lines;
+pub mod memory;
 pub mod merge;
 pub mod mesh;
 pub mod metadata;
@@ -41,6 +43,7 @@ pub use cameras::{
     CameraDefaults, CameraSet, NamedCamera, camera_json, parse_camera_json, parse_cameras, read_camera_json,
     read_cameras, read_cameras_with, write_camera_json, write_cameras_json,
 };
+pub use checkpoint::{Identity, hash_file, hash_text, read_checkpoint, write_checkpoint};
 pub use cloud_file::{CloudFormat, CloudOptions, CloudTarget, cloud_format, read_cloud, write_cloud};
 pub use decimals::decimals;
 pub use error::{Error, Place};

@@ -129,9 +129,18 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
 /// # Errors
 /// As [`read_ply`], as far as the header goes.
 pub fn ply_has_faces(path: &Path) -> Result<bool, Error> {
-    let (file, size) = open(path)?;
-    let header = Header::read(&mut Source::new(file, size, path))?;
+    let header = header_of(path)?;
     Ok(Faces::find(&header).is_some_and(|index| header.elements[index].count > 0))
+}
+
+/// The tables of a PLY file.
+pub(crate) fn elements_of(path: &Path) -> Result<Vec<Element>, Error> {
+    Ok(header_of(path)?.elements)
+}
+
+fn header_of(path: &Path) -> Result<Header, Error> {
+    let (file, size) = open(path)?;
+    Header::read(&mut Source::new(file, size, path))
 }
 
 /// Reads a mesh from a PLY file: the vertices as [`read_ply`] does, and the faces between them.

@@ -227,7 +227,7 @@ fn part_of_the_samples() -> (Film, Metadata) {
     let mut film = film(window, AovSelection::ALL);
     film.position_origin = DVec3::new(500_000.25, 0.0, -1.0);
     let ending = Ending { background: Some([0.1, 0.25, 3e-9, 1.0]), display_space: true };
-    let mut sums = SampleSums::new(4, ending, &window, AovSelection::ALL);
+    let mut sums = SampleSums::new(4, ending, &window, AovSelection::ALL).unwrap();
     for (number, plane) in sums.planes.iter_mut().enumerate() {
         plane.iter_mut().enumerate().for_each(|(i, value)| *value = 1.0 / (number + 3 * i + 1) as f64);
     }
