@@ -62,7 +62,7 @@ mod tests {
             }
         });
         let mut pictures = vec![(made.collect(), 120)];
-        let Some(data) = crate::textures::images::data() else { return pictures };
+        let Some(data) = splat_bench::textures::images::data() else { return pictures };
         for name in ["textures/astronaut.png", "textures/chelsea.png", "meshes/spot/spot_texture.png"] {
             let picture = splat_io::read_png(&data.join(name)).unwrap();
             let width = picture.size[0] as usize;
