@@ -1,13 +1,16 @@
 //! The command line as it is written: raw options, before anything is known of the cloud.
 
+use crate::checkpoint::CheckpointArguments;
 use crate::choices::{
     ColorMapChoice, CompressionChoice, CoverageChoice, DetailChoice, EngineChoice, ExrTypeChoice,
     FilterChoice, KernelChoice, MappingChoice, PatternChoice, PngDepthChoice, ProgressChoice, ResolveChoice,
     ShadingChoice, TableChoice, TextureFilterChoice, UpChoice, WrapChoice,
 };
 use crate::console::Console;
+use crate::diff::DiffArguments;
 use crate::frames::FrameArguments;
 use crate::map::MapArguments;
+use crate::memory::Memory;
 use crate::prepare::{PreparationArguments, PrepareArguments};
 use crate::scene::Scene;
 use crate::values::{self, Background, Classes, ColorChoice, Columns, ThicknessValue, Tile, ViewDirection};
@@ -44,6 +47,17 @@ pub enum Command {
     Prepare(PrepareArguments),
     /// Say what is in a file, and every assumption made in reading it
     Info(InfoArguments),
+    /// Join crops, tiles and ranges of samples to the picture of one run
+    ///
+    /// Pieces are .exr files of one command line, but for --crop, --tile and --samples. Crops and tiles give the very bits of one
+    /// run, ranges of samples agree with it to 2 units in the last place of a float.
+    Merge(MergeArguments),
+    /// Say how two pictures differ: exit code 0 if they are the same, 1 if not, 2 if they cannot be compared
+    ///
+    /// The same are pictures whose common channels are equal bit for bit, or, if tolerances are given, where all of these
+    /// hold. Of EXR files values are compared as they are; where one picture is a PNG file, the other is compared as the PNG
+    /// file that would be written of it.
+    Diff(DiffArguments),
     /// Render a scene made in code, which shows what the program does
     Demo(DemoArguments),
 }
@@ -69,6 +83,9 @@ pub struct ConvertArguments {
     /// How files are read.
     #[command(flatten)]
     pub reading: ReadArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -84,6 +101,9 @@ pub struct ReadArguments {
     /// Only points of these classes, as 2,6 or, all but these, !7,18
     #[arg(long, value_name = "LIST", value_parser = values::classes)]
     pub classes: Option<Classes>,
+    /// Refuse files of which anything would be dropped, skipped or changed, instead of saying how much
+    #[arg(long)]
+    pub strict: bool,
 }
 
 impl ReadArguments {
@@ -91,6 +111,14 @@ impl ReadArguments {
     pub fn fill_in(&mut self, others: &Self) {
         self.columns = self.columns.take().or_else(|| others.columns.clone());
         self.classes = self.classes.take().or_else(|| others.classes.clone());
+        self.strict |= others.strict;
+    }
+
+    /// The options in words, as the command line has them.
+    pub fn describe(&self) -> String {
+        let columns = self.columns.as_ref().map(|columns| format!(" --columns {}", columns.0.join(",")));
+        let classes = self.classes.as_ref().map(|classes| format!(" --classes {classes}"));
+        columns.into_iter().chain(classes).collect()
     }
 }
 
@@ -106,9 +134,38 @@ pub struct InfoArguments {
     /// What the columns of a text file are: see render
     #[arg(long, value_name = "x,y,z,..", value_parser = values::columns, allow_hyphen_values = true)]
     pub columns: Option<Columns>,
+    /// Fail if anything of the file would be dropped, skipped or changed
+    #[arg(long)]
+    pub strict: bool,
     /// Write JSON
     #[arg(long)]
     pub json: bool,
+    /// How much memory may be used.
+    #[command(flatten)]
+    pub memory: Memory,
+}
+
+/// `splat merge`.
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// The pieces (.exr), in any order
+    #[arg(required = true, value_name = "PIECE")]
+    pub pieces: Vec<PathBuf>,
+    /// The picture: .exr; or .png, of pieces of floats (--exr-type float)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// The whole is this part of the frame, half open
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = values::crop)]
+    pub crop: Option<PixelRect>,
+    /// Lossless compression of an EXR file [default: that of the pieces]
+    #[arg(long, value_name = "METHOD")]
+    pub exr_compression: Option<CompressionChoice>,
+    /// Bits of a value in a PNG file
+    #[arg(long, value_name = "BITS", default_value = "8")]
+    pub png_depth: PngDepthChoice,
+    /// Say nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// `splat demo`.
@@ -171,6 +228,12 @@ pub struct RenderArguments {
     /// What is written.
     #[command(flatten, next_help_heading = "Output")]
     pub outputs: OutputArguments,
+    /// When checkpoints are made and used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub checkpoint: CheckpointArguments,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -452,7 +515,7 @@ mod tests {
                     --light 30,-10 --texture t.png --mapping planar --texture-wrap clamp --texture-filter \
                     trilinear --max-anisotropy 8 --texture-detail splat --environment e.exr --reflect \
                     --exr-type float --exr-compression piz --columns x,y,z,- --classes !7,18 --color height \
-                    --colormap inferno --color-range -1:2.5";
+                    --colormap inferno --color-range -1:2.5 --resume --checkpoint 0.5 --max-memory 1.5g";
         let arguments = render(line).unwrap();
         assert_eq!(arguments.camera.focus, Some(f64::INFINITY));
         assert_eq!(arguments.samples.samples, Some(0..4));
@@ -506,6 +569,11 @@ mod tests {
             assert_eq!(render(line).unwrap_err(), ErrorKind::MissingRequiredArgument, "{line}");
         }
         for line in ["--size 0x4", "--focus 0", "--aov z", "--wsat 0", "--radius-scale 0", "--view 1"] {
+            assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
+        }
+        for line in
+            ["--max-memory 0", "--max-memory 2Q", "--max-memory M", "--max-memory -1", "--checkpoint x"]
+        {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }
         for line in ["--up x", "--filter sinc", "--engine gpu"] {

@@ -4,11 +4,12 @@ use crate::arguments::{CloudArguments, RenderArguments};
 use crate::console::Console;
 use crate::inputs::{Reading, Sampling, read_one};
 use crate::material::{self, Images};
+use crate::memory::Memory;
 use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
 use crate::usage::UsageError;
-use crate::{colors, describe, output, prepare as preparation, resolve};
+use crate::{colors, describe, output, prepare as preparation, resolve, strict};
 use anyhow::{Context, ensure};
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
@@ -22,6 +23,8 @@ pub struct Assembled {
     pub cloud: Cloud,
     /// One for each input.
     pub reports: Vec<ImportReport>,
+    /// SHA-256 of the images, those of all clouds first.
+    pub image_hashes: Vec<String>,
     /// What the splats are made of.
     pub materials: Materials,
     /// What is shown as colour, in words; empty for the cloud's own.
@@ -49,20 +52,23 @@ pub fn assemble(
     progress: &Progress,
     times: &mut Times,
 ) -> anyhow::Result<Assembled> {
-    let images = material::read(&arguments.material, console)?;
+    let strict = arguments.reading.strict;
+    let images = material::read(&arguments.material, strict, arguments.memory, console)?;
     let sources = scene::sources(arguments)?;
     output::spare_inputs(&arguments.picture(), sources.iter().map(|source| &source.path))?;
     ensure!(
         !sources.is_empty(),
         UsageError::new("the scene file has no [[cloud]]: there is nothing to draw")
     );
-    let (read, time) = progress.stage("read", |update| read(sources, console, update));
+    let (read, time) = progress.stage("read", |update| read(sources, arguments.memory, console, update));
     times.read = time;
     let (mut parts, reports) = read?;
     let trained = parts.iter().all(|part| part.cloud.trained || part.cloud.is_empty());
     let options = resolve::options(arguments, trained)?;
     note_assumptions(console, &parts, &reports);
 
+    let of_clouds = parts.iter().flat_map(|part| &part.images.hashes);
+    let image_hashes = images.hashes.iter().chain(of_clouds).cloned().collect();
     let alone = parts.iter().any(|part| part.source.is_special())
         || Cloud::differ(parts.iter().map(|part| &part.cloud));
     let (assembled, time) = progress.stage("prepare", |update| {
@@ -72,27 +78,35 @@ pub fn assemble(
             for part in &mut parts {
                 part.cloud.place(&part.source.to_world);
             }
+            if parts.len() > 1 {
+                arguments.memory.check_copy(parts.iter().map(|part| &part.cloud))?;
+            }
             let cloud = Cloud::join(parts.into_iter().map(|part| part.cloud).collect())?;
             together(cloud, images, arguments, &options, console, update)
         }
     });
     times.prepare = time;
-    let (cloud, materials, color) = assembled?;
+    let (mut cloud, materials, color) = assembled?;
     crate::inputs::check_usable(&cloud, &reports)?;
-    Ok(Assembled { cloud, reports, materials, color, options })
+    if arguments.reading.strict {
+        strict::check_complete(&mut cloud, &reports)?;
+    }
+    Ok(Assembled { cloud, reports, image_hashes, materials, color, options })
 }
 
 /// Reads all inputs.
 fn read(
     sources: Vec<Source>,
+    memory: Memory,
     console: Console,
     progress: &mut dyn FnMut(f64),
 ) -> anyhow::Result<(Vec<Part>, Vec<ImportReport>)> {
     let count = sources.len() as f64;
     let (mut parts, mut reports) = (Vec::new(), Vec::new());
     for (index, source) in sources.into_iter().enumerate() {
-        let images = material::read(&source.settings.material, console)?;
-        let reading = Reading::new(Sampling::default(), false, &source.settings.reading);
+        let strict = source.settings.reading.strict;
+        let images = material::read(&source.settings.material, strict, memory, console)?;
+        let reading = Reading::new(Sampling::default(), false, &source.settings.reading, memory);
         let Import { cloud, report } =
             read_one(&source.path, &reading, &mut |done| progress((index as f64 + done) / count))?;
         parts.push(Part { source, cloud, images });
@@ -122,6 +136,7 @@ fn together(
     let up = resolve::up(&arguments.camera, &cloud);
     let choice = colors::choose(&cloud, &arguments.splats.colors)?;
     let missing = estimates(arguments, options, up);
+    arguments.memory.check_preparation(&cloud, &missing)?;
     let estimated = prepare(&mut cloud, &missing, progress);
     if let Some(text) = preparation::in_words(&estimated, &missing) {
         console.note(text);
@@ -154,6 +169,7 @@ fn one_by_one(
         let up = resolve::up(&arguments.camera, &cloud);
         let mut missing = estimates(arguments, options, up);
         missing.size_scale *= radius_scale;
+        arguments.memory.check_preparation(&cloud, &missing)?;
         let estimated = prepare(&mut cloud, &missing, &mut |done| progress((index as f64 + done) / count));
         if let Some(text) = preparation::in_words(&estimated, &missing) {
             console.note(format_args!("{}: {text}", path.display()));
@@ -175,6 +191,9 @@ fn one_by_one(
             if is_own { (material, images) } else { (&arguments.material, shared.clone()) };
         runs.push((cloud.len(), material::material(material, images, &cloud, up).with_context(context)?));
         clouds.push(cloud);
+    }
+    if clouds.len() > 1 {
+        arguments.memory.check_copy(&clouds)?;
     }
     Ok((Cloud::join(clouds)?, Materials::of_runs(runs), color))
 }

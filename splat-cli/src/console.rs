@@ -52,7 +52,20 @@ pub fn error(error: &anyhow::Error) {
 
 /// A line to stderr. If even that fails, nobody is there to be told.
 pub fn to_stderr(line: impl Display) {
-    _ = writeln!(io::stderr().lock(), "{line}");
+    _ = writeln!(io::stderr().lock(), "{}", shown(&line.to_string()));
+}
+
+/// A text for a terminal, which may hold names from a file: without control characters but ends of lines and tabs.
+pub fn shown(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '\n' | '\t' => shown.push(character),
+            _ if character.is_control() => shown.extend(character.escape_default()),
+            _ => shown.push(character),
+        }
+    }
+    shown
 }
 
 /// Whether the reader of stdout has gone (`splat info x.ply | head`), which is no failure of ours.

@@ -33,7 +33,7 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
     output::check_file(path)?;
 
     let sampling = Sampling { points: arguments.points, seed: arguments.seed };
-    let reading = Reading::new(sampling, true, &arguments.reading);
+    let reading = Reading::new(sampling, true, &arguments.reading, arguments.memory);
     let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     let (mut cloud, reports) = input?;
     for report in &reports {
@@ -42,6 +42,7 @@ pub fn run(arguments: &ConvertArguments) -> anyhow::Result<()> {
         }
     }
     if target == CloudTarget::Splat {
+        arguments.memory.check_preparation(&cloud, &for_splats())?;
         progress.stage("prepare", |update| prepare(&mut cloud, &for_splats(), update));
     }
     let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };

@@ -49,7 +49,7 @@ pub fn run(arguments: &DemoArguments) -> anyhow::Result<()> {
     }
     let Some(path) = &arguments.output else { return Ok(()) };
     let mut engine = Engine::new(EngineChoice::Fast, None, console)?;
-    let rendered = engine.render(&cloud, &camera, &options, &progress, console)?;
+    let rendered = engine.render(&cloud, &camera, &options, None, &progress, console)?;
     let metadata = metadata(&camera, &options, &engine);
     let (written, _) = progress
         .stage("write", |_| write_picture(path, &rendered.film, &metadata, &PictureOptions::default()));

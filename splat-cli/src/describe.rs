@@ -7,9 +7,9 @@ use splat_abuffer::{Coverage, Resolve, Thickness};
 use splat_core::fit::Up;
 use splat_core::prepare::unknown_sizes;
 use splat_core::{Cloud, Kernel, PatternKind, PixelFilter, RenderOptions, Shading, TableMode};
-use std::fmt::Write;
+use splat_io::ImportReport;
 
-/// The options that tell one picture from another, as the command line has them; samples and seed have
+/// The options that tell one picture from another, as the command line has them; samples, seed and window have
 /// attributes of their own.
 pub fn options(options: &RenderOptions) -> String {
     let filter = match options.filter {
@@ -67,9 +67,6 @@ pub fn options(options: &RenderOptions) -> String {
     if options.cull {
         text.push_str(" --cull");
     }
-    if let Some(window) = options.window {
-        _ = write!(text, " --crop {},{},{},{}", window.x0, window.y0, window.x1, window.y1);
-    }
     text
 }
 
@@ -111,6 +108,12 @@ pub fn assumptions(cloud: &Cloud) -> Vec<String> {
         ),
     });
     assumptions
+}
+
+/// The files that were read: "a.ply, b.ply".
+pub fn paths(reports: &[ImportReport]) -> String {
+    let paths: Vec<String> = reports.iter().map(|report| report.path.display().to_string()).collect();
+    paths.join(", ")
 }
 
 /// Causes and their counts: "3 not_finite, 1 zero_normal".

@@ -1,10 +1,11 @@
 //! Which renderer makes the picture.
 
+use crate::checkpoint::Checkpoint;
 use crate::choices::EngineChoice;
 use crate::console::Console;
 use crate::progress::Progress;
 use anyhow::bail;
-use splat_core::{Camera, Cloud, RenderOptions, Rendered};
+use splat_core::{Camera, Cloud, RenderOptions, Rendered, Unfinished};
 use splat_simd::{Level, Renderer, compare};
 
 /// A renderer, and what the statistics say of it.
@@ -32,7 +33,8 @@ impl Engine {
         Ok(Self { choice, fast })
     }
 
-    /// Renders a picture. With `both`, checks first that the two cores agree on every fragment.
+    /// Renders a picture, with checkpoints if there are any, from where the last one was. With `both`, checks first that the two
+    /// cores agree on every fragment.
     ///
     /// # Errors
     /// What the renderer says, or the first fragment in which the cores differ.
@@ -41,12 +43,22 @@ impl Engine {
         cloud: &Cloud,
         camera: &Camera,
         options: &RenderOptions,
+        mut checkpoint: Option<&mut Checkpoint<'_>>,
         progress: &Progress,
         console: Console,
     ) -> anyhow::Result<Rendered> {
+        let begun = checkpoint.as_ref().map(|checkpoint| checkpoint.begun(options)).transpose()?.flatten();
+        let mut watch = |update: &mut dyn FnMut(f64), done: f64, unfinished: &Unfinished| {
+            update(done);
+            if let Some(checkpoint) = &mut checkpoint {
+                checkpoint.keep(unfinished);
+            }
+        };
         let Some(fast) = &mut self.fast else {
-            let (rendered, _) =
-                progress.stage("render", |update| splat_core::render(cloud, camera, options, update));
+            let (rendered, _) = progress.stage("render", |update| {
+                let mut watch = |done, unfinished: &_| watch(update, done, unfinished);
+                splat_core::render_from(begun, cloud, camera, options, &mut watch)
+            });
             return Ok(rendered?);
         };
         if self.choice == EngineChoice::Both {
@@ -67,7 +79,10 @@ impl Engine {
                 ),
             }
         }
-        let (rendered, _) = progress.stage("render", |update| fast.render(cloud, camera, options, update));
+        let (rendered, _) = progress.stage("render", |update| {
+            let mut watch = |done, unfinished: &_| watch(update, done, unfinished);
+            fast.render_from(begun, cloud, camera, options, &mut watch)
+        });
         Ok(rendered?)
     }
 

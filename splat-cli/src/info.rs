@@ -17,11 +17,13 @@ pub fn run(arguments: &InfoArguments) -> anyhow::Result<()> {
         let summary = camera::Summary::read(&arguments.file)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else if inputs::is_obj(&arguments.file) {
-        let summary = mesh::Summary::read(&arguments.file)?;
+        arguments.memory.check_file(&arguments.file, Some(0))?;
+        let summary = mesh::Summary::read(&arguments.file, arguments.strict)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     } else {
-        let summary = cloud::Summary::read(&arguments.file, arguments.columns.as_ref())?;
+        arguments.memory.check_file(&arguments.file, None)?;
+        let summary = cloud::Summary::read(&arguments.file, arguments.columns.as_ref(), arguments.strict)?;
         (serde_json::to_string_pretty(&summary)?, summary.to_string())
     };
-    Ok(console::data(&if arguments.json { json + "\n" } else { text })?)
+    Ok(console::data(&if arguments.json { json + "\n" } else { console::shown(&text) })?)
 }

@@ -2,6 +2,8 @@
 
 use crate::arguments::DEFAULT_POINTS;
 use crate::arguments::ReadArguments;
+use crate::memory::Memory;
+use crate::strict;
 use crate::values::Classes;
 use anyhow::{Context, bail, ensure};
 use splat_core::Cloud;
@@ -37,13 +39,24 @@ pub struct Reading {
     pub cloud: CloudOptions,
     /// The classes of points that are wanted; `None`: all.
     pub classes: Option<Classes>,
+    /// Whether what would be passed over is an error.
+    pub strict: bool,
+    /// How much memory may be used.
+    pub memory: Memory,
 }
 
 impl Reading {
     /// What the options ask for.
-    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments) -> Self {
+    pub fn new(sampling: Sampling, with_faces: bool, arguments: &ReadArguments, memory: Memory) -> Self {
         let columns = arguments.columns.as_ref().map(|columns| columns.0.clone());
-        Self { sampling, with_faces, cloud: CloudOptions { columns }, classes: arguments.classes.clone() }
+        Self {
+            sampling,
+            with_faces,
+            cloud: CloudOptions { columns },
+            classes: arguments.classes.clone(),
+            strict: arguments.strict,
+            memory,
+        }
     }
 }
 
@@ -60,16 +73,23 @@ pub fn read(
         read_one(path, reading, &mut |done| progress((index as f64 + done) / paths.len() as f64))
     };
     let imports: Vec<Import> = paths.iter().enumerate().map(one).collect::<anyhow::Result<_>>()?;
-    let (clouds, reports) = imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    let (clouds, reports): (Vec<Cloud>, _) =
+        imports.into_iter().map(|import| (import.cloud, import.report)).unzip();
+    if clouds.len() > 1 {
+        reading.memory.check_copy(&clouds)?;
+    }
     Ok((Cloud::join(clouds)?, reports))
 }
 
 /// Reads a cloud, or a mesh as a cloud, and picks the classes that are wanted.
 ///
 /// # Errors
-/// What the reader says; a mesh without an area; a cloud without classes.
+/// What the reader says; a mesh without an area; a cloud without classes; what a strict reading refuses.
 pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     let mut import = read_all(path, reading, progress)?;
+    if reading.strict {
+        strict::check_import(&mut import)?;
+    }
     if let Some(classes) = &reading.classes {
         // Class 0 is what was never classified.
         let field = import.cloud.field("classification");
@@ -86,6 +106,7 @@ pub fn read_one(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -
             path.display(),
             classes_of(&import.cloud)
         );
+        reading.memory.check_copy([&import.cloud])?;
         import.cloud = import.cloud.only(&kept);
     }
     Ok(import)
@@ -108,10 +129,13 @@ fn classes_of(cloud: &Cloud) -> String {
 /// Reads a cloud, or a mesh as a cloud.
 fn read_all(path: &Path, reading: &Reading, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Import> {
     if is_obj(path) {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_obj(path)?, reading.sampling, progress)
     } else if reading.with_faces && cloud_format(path)? == CloudFormat::Ply && ply_has_faces(path)? {
+        reading.memory.check_file(path, Some(reading.sampling.points))?;
         sampled(read_ply_mesh(path)?, reading.sampling, progress)
     } else {
+        reading.memory.check_file(path, None)?;
         Ok(read_cloud(path, &reading.cloud)?)
     }
 }
@@ -131,6 +155,8 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
     } else {
         "the normals of vertices tell the outside; splats lie in their triangles".to_owned()
     });
+    report.losses.extend(strict::without_area(&mesh, skipped));
+    report.losses.extend(strict::without_texture(&mesh, without_texture));
     if skipped > 0 {
         report.assumptions.push(format!("{skipped} triangles without an area are skipped"));
     }
@@ -145,8 +171,7 @@ fn sampled(import: MeshImport, sampling: Sampling, progress: &mut dyn FnMut(f64)
 /// # Errors
 /// A sentence that counts the defects.
 pub fn check_usable(cloud: &Cloud, reports: &[ImportReport]) -> anyhow::Result<()> {
-    let names: Vec<String> = reports.iter().map(|report| report.path.display().to_string()).collect();
-    let names = names.join(", ");
+    let names = crate::describe::paths(reports);
     ensure!(!cloud.is_empty(), "{names}: the cloud is empty");
     if (0..cloud.len()).any(|index| cloud.defect(index).is_none()) {
         return Ok(());

@@ -1,19 +1,21 @@
 //! The program `splat`: pictures of surfel clouds.
 //!
 //! Data go to stdout; progress, summaries, warnings and errors go to stderr. Exit codes: 0 success, 1
-//! failure, 2 usage, 130 interrupted, 143 terminated.
+//! failure, 2 usage, 130 interrupted, 143 terminated; those of `splat diff` are [its own](diff::run).
 
 #![forbid(unsafe_code)]
 
 mod arguments;
 mod assemble;
 mod cameras;
+mod checkpoint;
 mod choices;
 mod colors;
 mod console;
 mod convert;
 mod demo;
 mod describe;
+mod diff;
 mod engine;
 mod eye_dome;
 mod frames;
@@ -22,6 +24,8 @@ mod inputs;
 mod interrupt;
 mod map;
 mod material;
+mod memory;
+mod merge;
 mod output;
 mod prepare;
 mod progress;
@@ -29,6 +33,7 @@ mod render;
 mod resolve;
 mod scene;
 mod statistics;
+mod strict;
 mod turntable;
 mod usage;
 mod values;
@@ -44,7 +49,10 @@ const FAILURE: u8 = 1;
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let Err(error) = run() else { return ExitCode::SUCCESS };
+    let error = match run() {
+        Ok(code) => return code,
+        Err(error) => error,
+    };
     if console::is_broken_pipe(&error) {
         return ExitCode::SUCCESS;
     }
@@ -53,7 +61,7 @@ fn main() -> ExitCode {
 }
 
 /// Runs the command of the command line.
-fn run() -> anyhow::Result<()> {
+fn run() -> anyhow::Result<ExitCode> {
     interrupt::watch()?;
     let (arguments, matches) = scene::parse(std::env::args_os().collect())?;
     match arguments.command {
@@ -62,6 +70,9 @@ fn run() -> anyhow::Result<()> {
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Prepare(arguments) => prepare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Diff(arguments) => return Ok(diff::run(&arguments)),
         Command::Demo(arguments) => demo::run(&arguments),
-    }
+    }?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -3,7 +3,9 @@
 use crate::arguments::MaterialArguments;
 use crate::choices::MappingChoice;
 use crate::console::Console;
+use crate::memory::Memory;
 use crate::usage::UsageError;
+use anyhow::ensure;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use splat_core::Cloud;
 use splat_core::fit::Up;
@@ -12,7 +14,7 @@ use splat_core::texture::{
     CylinderHeight, CylindricalMapping, ImageTexture, Mapping, PlanarMapping, Pyramid, Sampler,
     SphericalMapping, Texture, UvMapping, Wrap,
 };
-use splat_io::read_pyramid;
+use splat_io::{file_sha256, read_pyramid};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,17 +53,27 @@ pub fn check(arguments: &MaterialArguments) -> Result<(), UsageError> {
 pub struct Images {
     texture: Option<Arc<Pyramid>>,
     environment: Option<Arc<Pyramid>>,
+    /// SHA-256 of their files.
+    pub hashes: Vec<String>,
 }
 
 /// Reads the images; before the clouds, which take longer.
 ///
 /// # Errors
-/// Images that cannot be read.
-pub fn read(arguments: &MaterialArguments, console: Console) -> anyhow::Result<Images> {
+/// Images that cannot be read, or take too much memory, and, to the strict, those with values that are not finite.
+pub fn read(
+    arguments: &MaterialArguments,
+    strict: bool,
+    memory: Memory,
+    console: Console,
+) -> anyhow::Result<Images> {
     let wrap: Wrap = arguments.texture_wrap.unwrap_or_default().into();
-    let read =
-        |path: &Option<PathBuf>, wrap| path.as_ref().map(|path| image(path, wrap, console)).transpose();
+    let read = |path: &Option<PathBuf>, wrap| {
+        path.as_ref().map(|path| image(path, wrap, strict, memory, console)).transpose()
+    };
+    let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
     Ok(Images {
+        hashes: files.map(|path| file_sha256(path)).collect::<Result<_, _>>()?,
         texture: read(&arguments.texture, [wrap; 2])?,
         environment: read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?,
     })
@@ -93,10 +105,18 @@ pub fn material(
     Ok(material)
 }
 
-/// Reads an image, and warns of texels that are no numbers.
-fn image(path: &Path, wrap: [Wrap; 2], console: Console) -> anyhow::Result<Arc<Pyramid>> {
+/// Reads an image, and warns of texels that are no numbers, or refuses them.
+fn image(
+    path: &Path,
+    wrap: [Wrap; 2],
+    strict: bool,
+    memory: Memory,
+    console: Console,
+) -> anyhow::Result<Arc<Pyramid>> {
+    memory.check_image(path)?;
     let pyramid = read_pyramid(path, wrap)?;
     if let count @ 1.. = pyramid.replaced() {
+        ensure!(!strict, "{}: --strict: {count} values that are not finite", path.display());
         console.warn(format_args!("{}: values replaced that are not finite: {count}", path.display()));
     }
     Ok(Arc::new(pyramid))

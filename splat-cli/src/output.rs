@@ -3,6 +3,7 @@
 use crate::usage::UsageError;
 use anyhow::bail;
 use splat_core::AovSelection;
+use splat_io::atomic::remove_leftovers;
 use splat_io::{AtomicFile, PictureFormat};
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,8 @@ pub fn check_picture(path: &Path, aovs: AovSelection, separate: bool) -> anyhow:
     check_file(path)
 }
 
-/// Checks that a file can be made there, by making one and throwing it away.
+/// Checks that a file can be made there, by making one and throwing it away; and clears away what runs that were killed left
+/// there.
 ///
 /// # Errors
 /// A folder that is missing; what the operating system says.
@@ -32,6 +34,7 @@ pub fn check_file(path: &Path) -> anyhow::Result<()> {
         bail!("{}: there is no folder {}", path.display(), folder.display());
     }
     drop(AtomicFile::create(path)?);
+    remove_leftovers(path);
     Ok(())
 }
 

@@ -3,9 +3,10 @@
 use crate::arguments::{ReadArguments, TalkArguments};
 use crate::choices::{KernelChoice, UpChoice};
 use crate::inputs::{self, Reading, Sampling};
+use crate::memory::Memory;
 use crate::progress::Progress;
 use crate::usage::UsageError;
-use crate::{output, resolve, values};
+use crate::{output, resolve, strict, values};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use splat_core::Cloud;
@@ -46,6 +47,9 @@ pub struct PrepareArguments {
     /// Threads; 0 is one a processor
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
+    /// How much memory may be used.
+    #[command(flatten, next_help_heading = "Program")]
+    pub memory: Memory,
     /// How talkative the program is.
     #[command(flatten, next_help_heading = "Program")]
     pub talk: TalkArguments,
@@ -191,7 +195,7 @@ pub fn run(arguments: &PrepareArguments) -> anyhow::Result<()> {
     output::check_file(path)?;
     use_threads(arguments.threads);
 
-    let reading = Reading::new(Sampling::default(), false, &arguments.reading);
+    let reading = Reading::new(Sampling::default(), false, &arguments.reading, arguments.memory);
     let (input, _) = progress.stage("read", |update| inputs::read(&arguments.inputs, &reading, update));
     let (mut cloud, reports) = input?;
     for report in &reports {
@@ -204,8 +208,15 @@ pub fn run(arguments: &PrepareArguments) -> anyhow::Result<()> {
         cutoff: arguments.cutoff,
         ..arguments.preparation.options(up(arguments, &cloud))
     };
+    arguments.memory.check_preparation(&cloud, &options)?;
     let (estimated, _) = progress.stage("prepare", |update| prepare(&mut cloud, &options, update));
     inputs::check_usable(&cloud, &reports)?;
+    if arguments.reading.strict {
+        strict::check_complete(&mut cloud, &reports)?;
+    }
+    if cloud.outliers.is_some() {
+        arguments.memory.check_copy([&cloud])?;
+    }
     cloud.remove_outliers();
     let encoding = if arguments.ascii { PlyEncoding::Ascii } else { PlyEncoding::Binary };
     let (written, _) = progress.stage("write", |_| write_ply(path, &cloud, encoding));

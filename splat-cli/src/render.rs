@@ -1,8 +1,9 @@
 //! `splat render`: clouds in, a picture out.
 
-use crate::arguments::{MaterialArguments, OutputArguments, RenderArguments};
+use crate::arguments::{MaterialArguments, RenderArguments};
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
+use crate::checkpoint::{Checkpoint, Checkpoints};
 use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
@@ -12,7 +13,7 @@ use crate::usage::UsageError;
 use crate::values::ViewDirection;
 use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve, scene};
 use splat_core::{Camera, Cloud, RenderOptions, Statistics};
-use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, write_picture};
+use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, camera_json, write_picture};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,7 +42,7 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
     let mut times = Times::default();
-    let Assembled { cloud, reports, materials, color, options } =
+    let Assembled { cloud, reports, image_hashes, materials, color, options } =
         assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
@@ -49,23 +50,40 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let count = shots.len();
     let mut statistics = Vec::with_capacity(count);
+    let mut memory = None;
+    let checkpoints = Checkpoints::new(arguments, &reports);
+    let mut sequence = (count > 1).then(|| checkpoints.of_sequence()).transpose()?;
     for (number, shot) in (1..).zip(shots) {
         let camera = shot.camera.or_else(|| Some(fitted.as_ref()?.camera(shot.index)));
         let camera = camera.expect("a shot has a camera, or there is a fitted one");
         let (camera, options) = resolve::against_cloud(arguments, options.clone(), camera, &cloud)?;
-        let options = RenderOptions { material: materials.clone(), ..options };
+        let memory = *memory.get_or_insert_with(|| arguments.memory.for_rendering(camera.width, &options));
+        let options = RenderOptions { material: materials.clone(), memory, ..options };
         options.check()?;
+        if sequence.as_ref().is_some_and(|sequence| sequence.has(&shot.output, &camera)) {
+            console.summary(format_args!("{}: complete already", shot.output.display()));
+            continue;
+        }
+        let mut checkpoint = checkpoints.of(&shot.output, &camera);
         let picture = Picture {
             arguments,
             cloud: &cloud,
             reports: &reports,
+            image_hashes: &image_hashes,
             color: &color,
-            camera,
+            camera: camera.clone(),
             options,
-            path: shot.output,
+            path: shot.output.clone(),
         };
         let progress = progress.frame(number, count);
-        statistics.push(picture.make(&mut engine, &progress, &mut times, start)?);
+        statistics.push(picture.make(&mut engine, &mut checkpoint, &progress, &mut times, start)?);
+        checkpoint.remove();
+        if let Some(sequence) = &mut sequence {
+            sequence.add(shot.output, camera);
+        }
+    }
+    if let Some(sequence) = sequence {
+        sequence.remove();
     }
     if let Some(path) = &arguments.outputs.stats {
         statistics::write(&statistics, path)?;
@@ -78,6 +96,7 @@ struct Picture<'a> {
     arguments: &'a RenderArguments,
     cloud: &'a Cloud,
     reports: &'a [ImportReport],
+    image_hashes: &'a [String],
     /// What is shown as colour, in words.
     color: &'a str,
     camera: Camera,
@@ -90,22 +109,24 @@ impl Picture<'_> {
     fn make(
         self,
         engine: &mut Engine,
+        checkpoint: &mut Checkpoint<'_>,
         progress: &Progress,
         times: &mut Times,
         start: Instant,
     ) -> anyhow::Result<Report> {
-        let Self { arguments, cloud, reports, color, camera, options, path } = self;
+        let Self { arguments, cloud, reports, image_hashes, color, camera, options, path } = self;
         let console = arguments.talk.console();
         let strength = arguments.splats.edl_strength.unwrap_or(1.0);
         let is_edl = arguments.splats.shading == ShadingChoice::Edl;
-        let rendered = if is_edl {
-            eye_dome::render(engine, cloud, &camera, &options, strength, progress, console)?
-        } else {
-            engine.render(cloud, &camera, &options, progress, console)?
-        };
-        let hashes: Vec<&str> = reports.iter().map(|report| report.sha256.as_str()).collect();
+        let mut render =
+            |options: &_| engine.render(cloud, &camera, options, Some(checkpoint), progress, console);
+        let rendered =
+            if is_edl { eye_dome::render(&camera, &options, strength, render)? } else { render(&options)? };
+        let hashes = reports.iter().map(|report| &report.sha256).chain(image_hashes);
+        let hashes: Vec<&str> = hashes.map(String::as_str).collect();
         let mut in_words = describe::options(&options) + &material::describe(&arguments.material) + color;
         in_words += &arguments.preparation.describe();
+        in_words += &arguments.reading.describe();
         if is_edl {
             for lit in ["--shading color", "--shading headlight"] {
                 in_words = in_words.replace(lit, &format!("--shading edl --edl-strength {strength}"));
@@ -123,9 +144,8 @@ impl Picture<'_> {
             pixels_per_inch: arguments.camera.map.dpi(),
             ..metadata(&camera, &options, engine)
         };
-        let (written, time) = progress.stage("write", |_| {
-            write_picture(&path, &rendered.film, &metadata, &picture_options(&arguments.outputs))
-        });
+        let (written, time) = progress
+            .stage("write", |_| write_picture(&path, &rendered.film, &metadata, &picture_options(arguments)));
         times.write = time;
         written?;
         times.total = start.elapsed();
@@ -150,16 +170,20 @@ pub fn metadata(camera: &Camera, options: &RenderOptions, engine: &Engine) -> Me
         seed: Some(options.seed),
         engine: Some(engine.name().to_owned()),
         options: Some(describe::options(options)),
+        camera: camera_json(camera),
+        crop: options.window,
         ..Metadata::default()
     }
 }
 
-fn picture_options(arguments: &OutputArguments) -> PictureOptions {
+fn picture_options(arguments: &RenderArguments) -> PictureOptions {
+    let RenderArguments { outputs: arguments, memory, .. } = arguments;
     PictureOptions {
         exr: ExrOptions {
             full_floats: arguments.exr_type == ExrTypeChoice::Float,
             compression: arguments.exr_compression.into(),
-            ..ExrOptions::default()
+            // Each processor would have some lines at hand.
+            parallel: !memory.is_limited(),
         },
         png_depth: arguments.png_depth.into(),
         separate_aovs: arguments.aov_files,

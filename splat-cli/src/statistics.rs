@@ -1,7 +1,7 @@
 //! The statistics file: what a picture took, as JSON.
 
-use crate::console;
 use crate::engine::Engine;
+use crate::{console, memory};
 use serde::Serialize;
 use splat_core::Statistics;
 use splat_io::AtomicFile;
@@ -96,7 +96,7 @@ impl Report {
                 write: times.write.as_secs_f64(),
                 total: times.total.as_secs_f64(),
             },
-            peak_bytes: peak_bytes(),
+            peak_bytes: memory::peak_bytes(),
         }
     }
 }
@@ -124,17 +124,6 @@ pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Most memory ever held by this process, in bytes: Linux tells.
-fn peak_bytes() -> Option<u64> {
-    peak_of(&std::fs::read_to_string("/proc/self/status").ok()?)
-}
-
-/// The line `VmHWM` of a process's status.
-fn peak_of(status: &str) -> Option<u64> {
-    let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    Some(kilobytes.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,12 +145,5 @@ mod tests {
         assert_eq!(keys(&json["seconds"]), expected);
         assert_eq!(json["splats"], serde_json::json!({ "read": 9, "dropped": { "edge_on": 2 }, "drawn": 7 }));
         assert_eq!(json["isa"], "scalar");
-    }
-
-    #[test]
-    fn peak_memory_is_the_high_water_mark() {
-        assert_eq!(peak_of("Name:\tsplat\nVmPeak:\t  9 kB\nVmHWM:\t    1234 kB\n"), Some(1_263_616));
-        assert_eq!(peak_of("Name:\tsplat\n"), None);
-        assert_eq!(peak_of("VmHWM:\tmany kB"), None);
     }
 }

@@ -4,9 +4,10 @@ use glam::DVec3;
 use splat_core::prepare::Outliers;
 use splat_core::{AovSelection, PixelRect};
 use splat_io::mesh::MOST_SURFELS;
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};
 use std::str::FromStr;
+use std::time::Duration;
 
 /// Exactly N values with `separator` between them, spaces around each allowed.
 fn split<T: FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
@@ -25,6 +26,28 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text, "a finite number greater than 0", |value| value.is_finite() && value > 0.0)
 }
 
+/// A time in seconds; 0 is allowed.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    const MOST: f64 = 1e9;
+    number(text, "a number of seconds, 0 or more", |value| (0.0..=MOST).contains(&value))
+        .map(Duration::from_secs_f64)
+}
+
+/// A size of memory: bytes, or with K, M, G or T those times powers of 1024.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let (number, shift) = match text.char_indices().last() {
+        Some((end, unit)) if unit.is_ascii_alphabetic() => {
+            let shift = "KMGT".find(unit.to_ascii_uppercase()).map(|power| 10 * (power + 1));
+            (&text[..end], shift)
+        }
+        _ => (text, Some(0)),
+    };
+    let value: Option<f64> = number.trim().parse().ok().filter(|value| (0.0..=1e15).contains(value));
+    let bytes = value.zip(shift).map(|(value, shift)| (value * (1u64 << shift) as f64) as u64);
+    bytes.filter(|&bytes| bytes > 0).ok_or_else(|| "expected a size as 512M or 2G".to_owned())
+}
+
 /// A share of the whole.
 pub fn share(text: &str) -> Result<f64, String> {
     number(text, "a number from 0 to 1", |value| (0.0..=1.0).contains(&value))
@@ -33,6 +56,12 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// `--columns`: what the columns of a text are, in their order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns(pub Vec<String>);
+
+/// A number that differences are held against: 0 or more, not necessarily finite.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| *value >= 0.0);
+    value.ok_or_else(|| "expected a number, 0 or more".to_owned())
+}
 
 /// `--columns`.
 pub fn columns(text: &str) -> Result<Columns, String> {
@@ -51,6 +80,13 @@ pub struct Classes {
     listed: Vec<u8>,
     /// Whether all others are wanted.
     is_except: bool,
+}
+
+impl Display for Classes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let listed: Vec<String> = self.listed.iter().map(ToString::to_string).collect();
+        write!(f, "{}{}", if self.is_except { "!" } else { "" }, listed.join(","))
+    }
 }
 
 impl Classes {
@@ -330,7 +366,7 @@ mod tests {
     use super::*;
 
     /// Checks that each text is refused.
-    fn refused<T: std::fmt::Debug>(parse: impl Fn(&str) -> Result<T, String>, texts: &[&str]) {
+    fn refused<T: fmt::Debug>(parse: impl Fn(&str) -> Result<T, String>, texts: &[&str]) {
         for text in texts {
             assert!(parse(text).is_err(), "{text:?}: {:?}", parse(text));
         }

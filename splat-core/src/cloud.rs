@@ -168,6 +168,29 @@ impl Cloud {
         self.positions.len()
     }
 
+    /// Bytes of memory that its arrays take.
+    pub fn bytes(&self) -> usize {
+        fn of<T>(values: &[T]) -> usize {
+            size_of_val(values)
+        }
+        let shapes = match &self.shapes {
+            Shapes::Discs(sizes) => of(sizes),
+            Shapes::Ellipses(axes) => of(axes),
+        };
+        let harmonics =
+            |harmonics: &SphericalHarmonics| (0..harmonics.len()).map(|i| of(harmonics.of(i))).sum();
+        let optional = [
+            self.colors.as_deref().map(of),
+            self.harmonics.as_ref().map(harmonics),
+            self.opacities.as_deref().map(of),
+            self.areas.as_deref().map(of),
+            self.texture_coordinates.as_deref().map(of),
+            self.outliers.as_deref().map(of),
+        ];
+        let fields: usize = self.fields.iter().map(|field| of(&field.values)).sum();
+        of(&self.positions) + of(&self.normals) + shapes + optional.iter().flatten().sum::<usize>() + fields
+    }
+
     /// Whether the cloud has no splat at all.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()

@@ -1,5 +1,7 @@
 //! What can be wrong with a scene, a camera or a set of options.
 
+use crate::memory::in_words;
+
 /// Why a picture cannot be made.
 ///
 /// Bad *points* are no error: they are dropped and counted (see [`crate::cloud::Defect`]). An error is
@@ -25,6 +27,19 @@ pub enum Error {
         found: usize,
         /// The number of positions.
         expected: usize,
+    },
+    /// More memory than there is, or than was allowed ([`crate::RenderOptions::memory`]).
+    #[error("{what} needs {} of memory, and {}: {help}", in_words(*needed),
+        left.map_or("the system has no more".to_owned(), |left| in_words(left) + " are left"))]
+    Memory {
+        /// What it is for.
+        what: &'static str,
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes left of what was allowed; `None` where the system refused.
+        left: Option<usize>,
+        /// How less would do.
+        help: &'static str,
     },
     /// The scene has nothing that could be looked at.
     #[error("the cloud has no usable point ({0})")]

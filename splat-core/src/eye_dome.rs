@@ -47,6 +47,8 @@ pub fn shade(film: &mut Film, camera: &Camera, strength: f64) -> Result<(), Erro
     for (rgba, factor) in film.rgba.iter_mut().zip(factors) {
         rgba[..3].iter_mut().for_each(|value| *value *= factor);
     }
+    // They know nothing of the factors.
+    film.sums = None;
     Ok(())
 }
 

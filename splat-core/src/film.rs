@@ -1,5 +1,8 @@
 //! The finished picture: colour, alpha and what else was asked for (AOVs).
 
+use crate::memory::filled;
+use crate::sums::{Ending, SampleSums};
+use crate::{Error, RenderOptions};
 use glam::{DVec3, Vec3};
 
 /// A half-open rectangle of pixels of the full frame.
@@ -78,6 +81,14 @@ pub struct AovSelection {
 }
 
 impl AovSelection {
+    /// Bytes that a film takes for each pixel.
+    pub fn bytes_per_pixel(&self) -> usize {
+        let vectors = [self.normal, self.albedo, self.position, self.variance];
+        let scalars = [self.depth, self.id, self.coverage, self.layers, self.samples];
+        let count = |wanted: &[bool]| wanted.iter().filter(|wanted| **wanted).count();
+        size_of::<[f32; 4]>() + count(&vectors) * size_of::<Vec3>() + count(&scalars) * size_of::<f32>()
+    }
+
     /// All of them.
     pub const ALL: Self = Self {
         depth: true,
@@ -94,6 +105,11 @@ impl AovSelection {
 
 /// [`Film::id`] of a pixel in which no sample hits anything.
 pub const NO_ID: u32 = u32::MAX;
+
+/// What errors call a film, and their advice.
+pub(crate) const FILM: &str = "the picture";
+pub(crate) const SMALLER_FILM: &str =
+    "a smaller size, fewer AOVs, or a part at a time (--crop, --tile) need less";
 
 /// A picture, or the window of one.
 ///
@@ -129,27 +145,57 @@ pub struct Film {
     pub samples: Option<Vec<f32>>,
     /// Variance of the mean of the samples' red, green and blue (before the background); zero for one sample.
     pub variance: Option<Vec<Vec3>>,
+    /// What the means were made of, if only a part of the samples was taken: see [`Film::add_samples`].
+    pub sums: Option<SampleSums>,
 }
 
 impl Film {
     /// An empty film: transparent, nothing hit.
+    ///
+    /// # Panics
+    /// If there is no memory for it: [`Film::try_new`] is for films that may be large.
     pub fn new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Self {
+        Self::try_new(frame, window, aovs).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// An empty film: transparent, nothing hit.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn try_new(frame: [u32; 2], window: PixelRect, aovs: AovSelection) -> Result<Self, Error> {
+        fn channel<T: Clone>(wanted: bool, value: T, count: usize) -> Result<Option<Vec<T>>, Error> {
+            wanted.then(|| filled(FILM, value, count, SMALLER_FILM)).transpose()
+        }
         let n = window.area();
-        Self {
+        Ok(Self {
             frame,
             window,
-            rgba: vec![[0.0; 4]; n],
-            depth: aovs.depth.then(|| vec![f32::INFINITY; n]),
-            normal: aovs.normal.then(|| vec![Vec3::ZERO; n]),
-            albedo: aovs.albedo.then(|| vec![Vec3::ZERO; n]),
-            position: aovs.position.then(|| vec![Vec3::ZERO; n]),
+            rgba: filled(FILM, [0.0; 4], n, SMALLER_FILM)?,
+            depth: channel(aovs.depth, f32::INFINITY, n)?,
+            normal: channel(aovs.normal, Vec3::ZERO, n)?,
+            albedo: channel(aovs.albedo, Vec3::ZERO, n)?,
+            position: channel(aovs.position, Vec3::ZERO, n)?,
             position_origin: DVec3::ZERO,
-            id: aovs.id.then(|| vec![NO_ID; n]),
-            coverage: aovs.coverage.then(|| vec![0.0; n]),
-            layers: aovs.layers.then(|| vec![0.0; n]),
-            samples: aovs.samples.then(|| vec![0.0; n]),
-            variance: aovs.variance.then(|| vec![Vec3::ZERO; n]),
+            id: channel(aovs.id, NO_ID, n)?,
+            coverage: channel(aovs.coverage, 0.0, n)?,
+            layers: channel(aovs.layers, 0.0, n)?,
+            samples: channel(aovs.samples, 0.0, n)?,
+            variance: channel(aovs.variance, Vec3::ZERO, n)?,
+            sums: None,
+        })
+    }
+
+    /// An empty film for a picture with these options: with sums, if they take a part of the samples.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn for_picture(frame: [u32; 2], window: PixelRect, options: &RenderOptions) -> Result<Self, Error> {
+        let mut film = Self::try_new(frame, window, options.aovs)?;
+        if options.takes_part_of_samples() {
+            let samples = options.sample_range().len() as u32;
+            film.sums = Some(SampleSums::new(samples, Ending::of(options), &window, options.aovs)?);
         }
+        Ok(film)
     }
 
     /// Gives every pixel what the first one holds in the channels where a pixel without fragments is not as a new one.
@@ -157,6 +203,24 @@ impl Film {
         fill_with_first(&mut self.rgba);
         if let Some(samples) = &mut self.samples {
             fill_with_first(samples);
+        }
+        for plane in self.sums.iter_mut().flat_map(|sums| &mut sums.planes) {
+            fill_with_first(plane);
+        }
+    }
+
+    /// What it holds besides colour and alpha.
+    pub fn aovs(&self) -> AovSelection {
+        AovSelection {
+            depth: self.depth.is_some(),
+            normal: self.normal.is_some(),
+            albedo: self.albedo.is_some(),
+            position: self.position.is_some(),
+            id: self.id.is_some(),
+            coverage: self.coverage.is_some(),
+            layers: self.layers.is_some(),
+            samples: self.samples.is_some(),
+            variance: self.variance.is_some(),
         }
     }
 
@@ -173,6 +237,9 @@ impl Film {
         paste_optional(&mut self.layers, part.layers.as_deref(), target);
         paste_optional(&mut self.samples, part.samples.as_deref(), target);
         paste_optional(&mut self.variance, part.variance.as_deref(), target);
+        if let (Some(to), Some(from)) = (&mut self.sums, &part.sums) {
+            to.planes.iter_mut().zip(&from.planes).for_each(|(to, from)| paste(to, from, target));
+        }
     }
 
     /// The part of this film in `window`, which lies within its own.
@@ -197,10 +264,16 @@ impl Film {
             layers: self.layers.as_ref().map(|values| cut(values, whole, window)),
             samples: self.samples.as_ref().map(|values| cut(values, whole, window)),
             variance: self.variance.as_ref().map(|values| cut(values, whole, window)),
+            sums: self.sums.as_ref().map(|sums| SampleSums {
+                samples: sums.samples,
+                ending: sums.ending,
+                aovs: sums.aovs,
+                planes: sums.planes.iter().map(|values| cut(values, whole, window)).collect(),
+            }),
         }
     }
 
-    /// Puts linear red, green, blue, and alpha behind the picture.
+    /// Puts linear red, green, blue, and alpha behind the picture; its sums, which know nothing of it, are gone.
     pub fn put_behind(&mut self, background: [f32; 4]) {
         let [red, green, blue, alpha] = background;
         let behind = [red * alpha, green * alpha, blue * alpha, alpha];
@@ -208,6 +281,7 @@ impl Film {
             let transmittance = 1.0 - rgba[3];
             rgba.iter_mut().zip(behind).for_each(|(value, behind)| *value += transmittance * behind);
         }
+        self.sums = None;
     }
 
     /// Width of the window, in pixels.
@@ -232,8 +306,8 @@ fn fill_with_first<T: Copy>(values: &mut [T]) {
     }
 }
 
-/// Copies a channel of the window `part` into that of the window `whole`, row by row.
-fn paste<T: Copy>(to: &mut [T], from: &[T], (whole, part): (PixelRect, PixelRect)) {
+/// Copies a channel of the window `part` into that of the window `whole`, which contains it, row by row.
+pub fn paste<T: Copy>(to: &mut [T], from: &[T], (whole, part): (PixelRect, PixelRect)) {
     let left = (part.x0 - whole.x0) as usize;
     let top = (part.y0 - whole.y0) as usize;
     for (row, values) in from.chunks_exact(part.width().max(1)).enumerate() {

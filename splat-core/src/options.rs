@@ -45,6 +45,10 @@ pub struct RenderOptions {
     pub aovs: AovSelection,
     /// Bytes that the fragments of a tile may take; a tile that needs more is split, to a pixel if need be.
     pub tile_memory: usize,
+    /// Bytes that a picture may take besides the cloud, the material and what a renderer keeps: for its samples, set-up, lists,
+    /// film and, on all threads together, fragments. What cannot do with that is [`Error::Memory`]; `usize::MAX` is without
+    /// limit.
+    pub memory: usize,
 }
 
 /// How light falls on splats.
@@ -85,6 +89,7 @@ impl Default for RenderOptions {
             material: Materials::default(),
             aovs: AovSelection::default(),
             tile_memory: 64 << 20,
+            memory: usize::MAX,
         }
     }
 }
@@ -104,6 +109,11 @@ impl RenderOptions {
     /// The samples that are taken.
     pub fn sample_range(&self) -> Range<u32> {
         self.sample_range.clone().unwrap_or(0..self.samples)
+    }
+
+    /// Whether those are not all: then the rest is to be added, and the film keeps its sums.
+    pub fn takes_part_of_samples(&self) -> bool {
+        self.sample_range() != (0..self.samples)
     }
 
     /// Checks every field.

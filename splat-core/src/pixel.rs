@@ -1,14 +1,15 @@
-//! From the resolved samples of a pixel to the film: the mean, the background, and the AOVs. SPEC section 6.
+//! From the fragments of a pixel's samples to its sums, and to the film. SPEC section 6.
 
 use crate::film::NO_ID;
 use crate::raster::SamplePlace;
 use crate::sampling::SampleTable;
 use crate::setup::{View, VisibleSplat, shading_normal, splat_color};
 use crate::shade::{Shaded, SplatShader};
+use crate::sums::{Ending, Sums};
 use crate::texture::ImageLookup;
-use crate::{AovSelection, Camera, Cloud, Film, PixelRect, RenderOptions, Shading, srgb};
-use glam::{DMat3, DVec2, DVec3, Vec3};
-use splat_abuffer::{Fragment, Resolve, Resolver, SampleColor, SplatSurface};
+use crate::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Shading};
+use glam::{DMat3, DVec2, DVec3};
+use splat_abuffer::{Fragment, Resolver, SampleColor, SplatSurface};
 
 /// Resolves the samples of one pixel after the other.
 ///
@@ -21,8 +22,8 @@ pub struct PixelResolver<'a> {
     to_world: DMat3,
     aovs: AovSelection,
     shading: Shading,
-    display_space: bool,
-    background: Option<[f32; 4]>,
+    ending: Ending,
+    options: &'a RenderOptions,
     resolver: Resolver,
     splats: &'a [VisibleSplat],
     surfaces: &'a [SplatSurface],
@@ -31,6 +32,9 @@ pub struct PixelResolver<'a> {
     /// The colours of the pixel's splats that were asked for, by rank.
     shaded: Vec<(u32, Shaded)>,
     sums: Sums,
+    /// Samples that were added.
+    samples: u32,
+    id: Option<u32>,
 }
 
 /// What a fragment's splat shares among its fragments, of this pixel at least.
@@ -41,23 +45,6 @@ fn surface_of(fragment: &Fragment, surfaces: &[SplatSurface], shaded: &[(u32, Sh
         None => surface,
         Some((_, Shaded { color, .. })) => SplatSurface { color: *color, ..surface },
     }
-}
-
-/// What is summed over the samples of a pixel.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    samples: u32,
-    color: [f64; 3],
-    color_squared: [f64; 3],
-    transmittance: f64,
-    uncovered: f64,
-    layers: u64,
-    visible: u32,
-    depth: f64,
-    normal: DVec3,
-    albedo: DVec3,
-    position: DVec3,
-    id: Option<u32>,
 }
 
 impl<'a> PixelResolver<'a> {
@@ -79,20 +66,24 @@ impl<'a> PixelResolver<'a> {
             to_world: camera.linear().inverse(),
             aovs: options.aovs,
             shading: options.shading,
-            display_space: options.resolve == Resolve::Over,
-            background: options.background,
+            ending: Ending::of(options),
+            options,
             resolver: Resolver::new(options.resolve),
             surfaces,
             shader: needs_shader.then(|| SplatShader::new(cloud, view, options, images)),
             shaded: Vec::new(),
             splats,
             sums: Sums::default(),
+            samples: 0,
+            id: None,
         }
     }
 
     /// Begins a pixel.
     pub fn start(&mut self) {
         self.sums = Sums::default();
+        self.samples = 0;
+        self.id = None;
         self.shaded.clear();
     }
 
@@ -136,45 +127,50 @@ impl<'a> PixelResolver<'a> {
     /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.
     #[inline(always)]
     pub fn add_colors(&mut self, samples: impl Iterator<Item = SampleColor>) {
-        let mut sums = self.sums;
-        for sample in samples {
-            sums.samples += 1;
-            let color = sample.color.map(f64::from);
-            for (sum, value) in sums.color.iter_mut().zip(color) {
-                *sum += value;
+        if self.aovs.variance || self.aovs.coverage {
+            let (mut sums, mut count) = (self.sums, self.samples);
+            for sample in samples {
+                count += 1;
+                sums.add(&sample, &self.aovs);
             }
-            sums.transmittance += f64::from(sample.transmittance);
-            if self.aovs.variance {
-                for (sum, value) in sums.color_squared.iter_mut().zip(color) {
-                    *sum += value * value;
+            (self.sums, self.samples) = (sums, count);
+        } else {
+            // So it nearly always is: the few sums that it needs stay in registers.
+            let Sums { mut color, mut transmittance, .. } = self.sums;
+            let mut count = self.samples;
+            for sample in samples {
+                count += 1;
+                for (sum, value) in color.iter_mut().zip(sample.color) {
+                    *sum += f64::from(value);
                 }
+                transmittance += f64::from(sample.transmittance);
             }
-            if self.aovs.coverage {
-                sums.uncovered += f64::from(sample.uncovered);
-            }
+            (self.sums.color, self.sums.transmittance, self.samples) = (color, transmittance, count);
         }
-        self.sums = sums;
     }
 
     /// A film of which every pixel is as one without fragments, with this many samples each.
-    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Film {
-        let mut film = Film::new(frame, window, self.aovs);
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn empty_film(&mut self, frame: [u32; 2], window: PixelRect, samples: usize) -> Result<Film, Error> {
+        let mut film = Film::for_picture(frame, window, self.options)?;
         self.start();
         self.add_colors((0..samples).map(|_| SampleColor::NOTHING));
         self.finish(window.x0, window.y0, &mut film);
         film.repeat_first_pixel();
-        film
+        Ok(film)
     }
 
     /// Adds to the sums what only the AOVs need.
     fn add_aovs(&mut self, place: SamplePlace, fragments: &[Fragment], samples: &SampleTable) {
         let layers = self.resolver.layers();
-        self.sums.layers += layers.len() as u64;
-        if self.aovs.id && self.sums.id.is_none() && !layers.is_empty() {
+        self.sums.layers += layers.len() as f64;
+        if self.aovs.id && self.id.is_none() && !layers.is_empty() {
             let front = self.resolver.fragments_of(&layers[0], fragments);
             // The first of the heaviest, in splat order.
             let heaviest = front.reduce(|best, next| if next.weight > best.weight { next } else { best });
-            self.sums.id = heaviest.map(|fragment| self.splats[fragment.rank() as usize].index);
+            self.id = heaviest.map(|fragment| self.splats[fragment.rank() as usize].index);
         }
         let AovSelection { depth, normal, albedo, position, .. } = self.aovs;
         if !(depth || normal || albedo || position) {
@@ -196,9 +192,9 @@ impl<'a> PixelResolver<'a> {
             }
         }
         let depth = depth_sum / weight;
-        self.sums.visible += 1;
+        self.sums.visible += 1.0;
         self.sums.depth += depth;
-        self.sums.normal += normal_sum.normalize_or_zero();
+        self.sums.add_normal(normal_sum.normalize_or_zero());
         self.sums.albedo += albedo_sum / weight;
         if position {
             self.sums.position += self.world_position(place, depth, samples) - self.cloud.origin;
@@ -235,61 +231,9 @@ impl<'a> PixelResolver<'a> {
     /// Writes the pixel's means to the film.
     pub fn finish(&self, x: i32, y: i32, film: &mut Film) {
         let index = film.index(x, y);
-        let sums = &self.sums;
-        let n = f64::from(sums.samples);
-        film.rgba[index] = self.pixel_color(sums.color.map(|sum| sum / n), sums.transmittance / n);
-        let visible = f64::from(sums.visible);
-        if sums.visible > 0 {
-            set(&mut film.depth, index, (sums.depth / visible) as f32);
-            set(&mut film.normal, index, (sums.normal / visible).as_vec3());
-            set(&mut film.albedo, index, (sums.albedo / visible).as_vec3());
-            set(&mut film.position, index, (sums.position / visible).as_vec3());
+        self.sums.finish(self.samples, &self.ending, index, film);
+        if let Some(ids) = &mut film.id {
+            ids[index] = self.id.unwrap_or(NO_ID);
         }
-        set(&mut film.id, index, sums.id.unwrap_or(NO_ID));
-        set(&mut film.coverage, index, (1.0 - sums.uncovered / n) as f32);
-        set(&mut film.layers, index, (sums.layers as f64 / n) as f32);
-        set(&mut film.samples, index, sums.samples as f32);
-        set(&mut film.variance, index, sums.variance_of_the_mean());
-    }
-
-    /// The pixel over its background: premultiplied, linear colour and alpha.
-    fn pixel_color(&self, color: [f64; 3], transmittance: f64) -> [f32; 4] {
-        let mut rgba = [color[0], color[1], color[2], 1.0 - transmittance];
-        if let Some([red, green, blue, alpha]) = self.background.map(|values| values.map(f64::from)) {
-            let weight = transmittance * alpha;
-            for (value, behind) in rgba.iter_mut().zip([red, green, blue]) {
-                *value += weight * if self.display_space { srgb::encode(behind) } else { behind };
-            }
-            rgba[3] += weight;
-        }
-        let [red, green, blue, alpha] = rgba;
-        if self.display_space && alpha > 0.0 {
-            // Blended as trained, in the display's space; linear from here on.
-            let [red, green, blue] = [red, green, blue].map(|value| srgb::decode(value / alpha) * alpha);
-            rgba = [red, green, blue, alpha];
-        }
-        rgba.map(|value| value as f32)
-    }
-}
-
-impl Sums {
-    /// Variance of the mean colour, per channel; zero for a single sample.
-    fn variance_of_the_mean(&self) -> Vec3 {
-        if self.samples < 2 {
-            return Vec3::ZERO;
-        }
-        let n = f64::from(self.samples);
-        let variance = [0, 1, 2].map(|channel| {
-            let sum = self.color[channel];
-            ((self.color_squared[channel] - sum * sum / n) / (n * (n - 1.0))).max(0.0) as f32
-        });
-        Vec3::from(variance)
-    }
-}
-
-/// Sets a pixel of a channel that may not be there.
-fn set<T>(channel: &mut Option<Vec<T>>, index: usize, value: T) {
-    if let Some(values) = channel {
-        values[index] = value;
     }
 }

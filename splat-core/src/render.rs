@@ -1,11 +1,14 @@
 //! From a cloud to a picture: set-up, tiles, A-buffer, resolve, film.
 
+use crate::film::{FILM, SMALLER_FILM};
+use crate::memory::{Budget, filled};
 use crate::pixel::PixelResolver;
 use crate::raster::{Rasterizer, SamplePlace};
-use crate::setup::{SetUp, View, VisibleSplat, set_up};
+use crate::setup::{SetUp, SortKey, View, VisibleSplat, set_up, sort_keys};
+use crate::sums::SampleSums;
 use crate::texture::ScalarLookup;
-use crate::{Camera, Cloud, Error, Film, PixelRect, RenderOptions};
-use splat_abuffer::{Fragment, MAX_RANK, TileBuffer};
+use crate::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions};
+use splat_abuffer::{Fragment, MAX_RANK, SplatSurface, TileBuffer};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -44,26 +47,101 @@ pub struct Statistics {
     pub resolve: Duration,
 }
 
+impl Statistics {
+    /// Adds what some tiles took.
+    pub fn add_tiles(&mut self, tiles: &Self) {
+        self.tests += tiles.tests;
+        self.fragments += tiles.fragments;
+        self.samples += tiles.samples;
+        self.raster += tiles.raster;
+        self.resolve += tiles.resolve;
+    }
+}
+
+/// A picture in the making: its first tiles are finished, whatever the threads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unfinished {
+    /// The finished tiles; what the others hold means nothing.
+    pub film: Film,
+    /// How many are finished.
+    pub tiles: usize,
+    /// What they took.
+    pub statistics: Statistics,
+}
+
+impl Unfinished {
+    /// Checks that this can become the picture of a frame of this window, these AOVs and so many tiles.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it is part of another one.
+    pub fn check(
+        &self,
+        frame: [u32; 2],
+        window: PixelRect,
+        aovs: AovSelection,
+        tiles: usize,
+    ) -> Result<(), Error> {
+        let film = &self.film;
+        if (film.frame, film.window, film.aovs()) == (frame, window, aovs) && self.tiles <= tiles {
+            return Ok(());
+        }
+        let found = format!("{} tiles of {}x{} pixels", self.tiles, film.frame[0], film.frame[1]);
+        Err(Error::invalid("unfinished picture", found, "one of the same frame, window and AOVs"))
+    }
+}
+
 /// Renders a cloud. `progress` is told the finished part of the picture, from 0 to 1, now and then.
 ///
 /// The cloud must have normals, and sizes and areas if the picture is to be free of holes: see
 /// [`crate::prepare::prepare`].
 ///
 /// # Errors
-/// If the camera, the options or the cloud's arrays are out of range. Bad points are no error; they are counted.
+/// If the camera, the options or the cloud's arrays are out of range, or there is too little memory. Bad points are no error;
+/// they are counted.
 pub fn render(
     cloud: &Cloud,
     camera: &Camera,
     options: &RenderOptions,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Rendered, Error> {
+    render_from(None, cloud, camera, options, &mut |done, _| progress(done))
+}
+
+/// Renders a cloud, from where it was left: the same bits as [`render`], if `begun` is a part of the same picture. `watch` is
+/// told the finished part, from 0 to 1, and what that looks like, now and then.
+///
+/// # Errors
+/// As [`render`]; [`Error::Invalid`] if `begun` cannot be part of it.
+pub fn render_from(
+    begun: Option<Unfinished>,
+    cloud: &Cloud,
+    camera: &Camera,
+    options: &RenderOptions,
+    watch: &mut dyn FnMut(f64, &Unfinished),
+) -> Result<Rendered, Error> {
     let frame = Frame::new(cloud, camera, options, set_up)?;
     let window = frame.view.window;
+    let mut memory = frame.memory;
     let start = Instant::now();
-    let tiles = Tiles::new(&frame.set_up.splats, &window);
+    let tiles = Tiles::new(&frame.set_up.splats, &window, &mut memory)?;
+    let statistics = frame.statistics(start.elapsed());
+    let size = [camera.width, camera.height];
+    let mut made = match begun {
+        Some(begun) => begun,
+        None => Unfinished {
+            film: Film::for_picture(size, window, options)?,
+            tiles: 0,
+            statistics: Statistics::default(),
+        },
+    };
+    made.check(size, window, options.aovs, tiles.len())?;
+    let tiles_before = std::mem::replace(&mut made.statistics, statistics);
+    made.statistics.add_tiles(&tiles_before);
+    made.film.position_origin = cloud.origin;
+    // The stream and the groups grow by doubling.
+    let share = memory.left() / 3;
     let mut picture = Picture {
         frame: &frame,
-        film: Film::new([camera.width, camera.height], window, options.aovs),
         pixels: PixelResolver::new(
             cloud,
             camera,
@@ -74,17 +152,20 @@ pub fn render(
             &ScalarLookup,
         ),
         buffer: TileBuffer::default(),
-        budget: options.tile_memory / TileBuffer::BYTES_PER_FRAGMENT,
-        statistics: frame.statistics(start.elapsed()),
+        budget: options.tile_memory.min(share) / TileBuffer::BYTES_PER_FRAGMENT,
+        most: if memory.is_limited() { share / TileBuffer::BYTES_PER_FRAGMENT } else { usize::MAX },
+        made,
     };
-    picture.film.position_origin = cloud.origin;
     let count = tiles.len();
-    for (number, (region, ranks)) in tiles.iter().enumerate() {
-        progress(number as f64 / count as f64);
-        picture.render_region(&region, ranks);
+    for tile in picture.made.tiles..count {
+        watch(tile as f64 / count as f64, &picture.made);
+        let (region, ranks) = tiles.get(tile);
+        picture.render_region(&region, ranks)?;
+        picture.made.tiles += 1;
     }
-    progress(1.0);
-    Ok(Rendered { film: picture.film, statistics: picture.statistics })
+    watch(1.0, &picture.made);
+    let Unfinished { film, statistics, .. } = picture.made;
+    Ok(Rendered { film, statistics })
 }
 
 /// Gives every fragment of a picture to `sink`, splat by splat in splat order: its place, its splat's index in the
@@ -119,6 +200,47 @@ pub struct Frame {
     pub set_up_time: Duration,
     /// The samples and the kernel.
     pub rasterizer: Rasterizer,
+    /// What is left of [`RenderOptions::memory`] after all this and the film.
+    pub memory: Budget,
+}
+
+/// Bytes that a splat takes in set-up: the result; and at most twice its key, once in the list that it was found in and once
+/// in that of all.
+const SET_UP_BYTES: usize =
+    size_of::<VisibleSplat>() + size_of::<SplatSurface>() + 3 * size_of::<SortKey>() + 4;
+
+/// At most so many bytes a sample of a pixel take the tables of all cores: 64 patterns of positions, and of points on the lens,
+/// as they are made, in the order of the reference, and in that of lanes.
+const SAMPLE_BYTES: usize = 8 << 10;
+
+/// The same with a lens: its points, and the cells of a lattice.
+const LENS_SAMPLE_BYTES: usize = 40 << 10;
+
+/// Splats that are counted at once.
+const COUNT_CHUNK: usize = 4096;
+
+/// Sets memory aside for the samples, the film and the set-up of a picture.
+fn budget(cloud: &Cloud, camera: &Camera, view: &View, options: &RenderOptions) -> Result<Budget, Error> {
+    let mut memory = Budget::new(options.memory);
+    if !memory.is_limited() {
+        return Ok(memory);
+    }
+    let per_sample = if camera.lens().is_some() { LENS_SAMPLE_BYTES } else { SAMPLE_BYTES };
+    let samples = per_sample * options.samples as usize;
+    memory.take("the table of samples", samples, "fewer samples (--spp) need less")?;
+    let of_sums = if options.takes_part_of_samples() { SampleSums::bytes_per_pixel(options.aovs) } else { 0 };
+    let film = view.window.area().saturating_mul(options.aovs.bytes_per_pixel() + of_sums);
+    memory.take(FILM, film, SMALLER_FILM)?;
+    let mut splats = cloud.len();
+    if splats.saturating_mul(SET_UP_BYTES) > memory.left() {
+        // Not all may be in view: to know takes a moment.
+        let chunks = (0..cloud.len()).step_by(COUNT_CHUNK);
+        let ends = |start: usize| start..cloud.len().min(start + COUNT_CHUNK);
+        splats = chunks.map(|start| sort_keys(cloud, view, options, ends(start)).0.len()).sum();
+    }
+    let set_up = splats.saturating_mul(SET_UP_BYTES);
+    memory.take("the set-up of the splats in view", set_up, "a cloud of fewer points needs less")?;
+    Ok(memory)
 }
 
 impl Frame {
@@ -156,11 +278,12 @@ impl Frame {
         if view.window.is_empty() {
             return Err(Error::invalid("crop", format!("{:?}", options.window), "a part of the frame"));
         }
+        let memory = budget(cloud, camera, &view, options)?;
         let start = Instant::now();
         let set_up = set_up(cloud, &view, options);
         let set_up_time = start.elapsed();
         let rasterizer = Rasterizer::new(&view, options);
-        Ok(Self { view, set_up, set_up_time, rasterizer })
+        Ok(Self { view, set_up, set_up_time, rasterizer, memory })
     }
 }
 
@@ -178,8 +301,14 @@ pub struct Tiles {
 
 impl Tiles {
     /// Sorts splats, whose bounds lie in the window, into its tiles.
-    pub fn new(splats: &[VisibleSplat], window: &PixelRect) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn new(splats: &[VisibleSplat], window: &PixelRect, memory: &mut Budget) -> Result<Self, Error> {
+        const WHAT: &str = "the lists of the tiles' splats";
+        const HELP: &str = "a smaller size, smaller splats, or a part at a time (--crop, --tile) need less";
         let grid = Grid::new(window);
+        memory.take(WHAT, splats.len().saturating_mul(size_of::<Span>()) + 8 * grid.len(), HELP)?;
         let spans: Vec<Span> = splats.iter().map(|splat| grid.span(&splat.bounds)).collect();
         // The length of each list first, so that all fit into one array; then where it starts, which each rank moves on.
         let mut ends = vec![0; grid.len()];
@@ -190,14 +319,15 @@ impl Tiles {
         for end in &mut ends {
             total += std::mem::replace(end, total);
         }
-        let mut ranks = vec![0; total];
+        memory.take(WHAT, size_of::<u32>().saturating_mul(total), HELP)?;
+        let mut ranks = filled(WHAT, 0, total, HELP)?;
         for (rank, &span) in spans.iter().enumerate() {
             grid.for_each_tile(span, |tile| {
                 ranks[ends[tile]] = rank as u32;
                 ends[tile] += 1;
             });
         }
-        Self { window: *window, grid, ranks, ends }
+        Ok(Self { window: *window, grid, ranks, ends })
     }
 
     /// Number of tiles.
@@ -280,30 +410,43 @@ struct Span {
 /// A picture in the making.
 struct Picture<'a> {
     frame: &'a Frame,
-    film: Film,
     pixels: PixelResolver<'a>,
     buffer: TileBuffer,
     /// Fragments that a tile may hold.
     budget: usize,
-    statistics: Statistics,
+    /// Fragments that a pixel may hold.
+    most: usize,
+    made: Unfinished,
+}
+
+/// The error of a pixel of so many fragments, and bytes that each takes, where `left` bytes are left.
+pub fn pixel_too_large(fragments: usize, bytes: usize, left: usize) -> Error {
+    Error::Memory {
+        what: "a pixel with so many fragments",
+        needed: fragments.saturating_mul(bytes),
+        left: Some(left),
+        help: "fewer samples at a time (--samples), fewer threads (--threads) or smaller splats need less",
+    }
 }
 
 impl Picture<'_> {
     /// Renders a tile, or a part of one. A region whose fragments exceed the budget is split into four; a single
-    /// pixel gets what it needs.
-    fn render_region(&mut self, region: &PixelRect, ranks: &[u32]) {
+    /// pixel gets what it needs, if there is as much.
+    fn render_region(&mut self, region: &PixelRect, ranks: &[u32]) -> Result<(), Error> {
         let start = Instant::now();
         let complete = self.collect(region, ranks);
-        self.statistics.raster += start.elapsed();
+        self.made.statistics.raster += start.elapsed();
         if complete {
             let start = Instant::now();
             self.resolve(region);
-            self.statistics.resolve += start.elapsed();
-        } else {
-            for quarter in quarters(region) {
-                self.render_region(&quarter, ranks);
-            }
+            self.made.statistics.resolve += start.elapsed();
+            return Ok(());
         }
+        if region.area() == 1 {
+            let bytes = TileBuffer::BYTES_PER_FRAGMENT;
+            return Err(pixel_too_large(self.buffer.len(), bytes, self.most * bytes));
+        }
+        quarters(region).try_for_each(|quarter| self.render_region(&quarter, ranks))
     }
 
     /// Fills the buffer with the region's fragments. Stops and returns false where they exceed the budget.
@@ -311,6 +454,7 @@ impl Picture<'_> {
         let rasterizer = &self.frame.rasterizer;
         let range = rasterizer.range();
         self.buffer.clear(region.area() * range.len());
+        let budget = if region.area() > 1 { self.budget } else { self.most };
         let buffer = &mut self.buffer;
         let positions = rasterizer.positions(region);
         let mut tests = 0;
@@ -320,12 +464,12 @@ impl Picture<'_> {
             tests += rasterizer.rasterize_at(&positions, splat, rank, &candidates, &mut |place, fragment| {
                 buffer.push(local_sample(region, place, range.len(), range.start), fragment);
             });
-            if buffer.len() > self.budget && region.area() > 1 {
+            if buffer.len() > budget {
                 return false;
             }
         }
-        self.statistics.tests += tests;
-        self.statistics.fragments += buffer.len() as u64;
+        self.made.statistics.tests += tests;
+        self.made.statistics.fragments += buffer.len() as u64;
         true
     }
 
@@ -342,10 +486,10 @@ impl Picture<'_> {
                     let fragments = self.buffer.sample(local_sample(region, place, range.len(), range.start));
                     self.pixels.add(place, fragments, rasterizer.samples());
                 }
-                self.pixels.finish(x, y, &mut self.film);
+                self.pixels.finish(x, y, &mut self.made.film);
             }
         }
-        self.statistics.samples += region.area() as u64 * range.len() as u64;
+        self.made.statistics.samples += region.area() as u64 * range.len() as u64;
     }
 }
 

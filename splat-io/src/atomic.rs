@@ -1,8 +1,14 @@
 //! Files that are absent, old, or complete.
+//!
+//! A program that is killed leaves its temporary files behind. They disturb nobody, since every one has a name of its own; and
+//! each is locked for as long as somebody writes it, so that [`remove_leftovers`] can tell the dead from the living.
+
+#[cfg(test)]
+pub(crate) mod faults;
 
 use crate::Error;
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -57,6 +63,53 @@ pub fn abandon_all() {
     std::mem::forget(unfinished);
 }
 
+/// What the names of temporary files begin and end with.
+const PREFIX: &str = ".splat-";
+const SUFFIX: &str = ".tmp";
+
+/// A new temporary file in a folder, locked where the file system has locks.
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    loop {
+        let temporary = builder.tempfile_in(folder)?;
+        let locked = temporary.as_file().try_lock();
+        // Before it was locked it may have been taken for a leftover: then another.
+        if !matches!(locked, Err(TryLockError::WouldBlock)) && temporary.path().exists() {
+            return Ok(temporary);
+        }
+    }
+}
+
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Removes the temporary files beside `path` that nobody writes any more: their program was killed, or the machine stopped.
+/// What cannot be removed stays; it harms nobody.
+pub fn remove_leftovers(path: &Path) {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let Ok(entries) = fs::read_dir(folder_of(&target)) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let is_ours = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        if !is_ours || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 impl AtomicFile {
     /// Starts a file that will become `path`, readable by whom the process's umask allows.
     ///
@@ -68,15 +121,7 @@ impl AtomicFile {
         if fs::metadata(&target).is_ok_and(|existing| !existing.is_file()) {
             return Err(Error::unsupported(path, "writing to a folder, device or pipe", "a regular file"));
         }
-        let folder = match target.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".splat-").suffix(".tmp");
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let temporary = builder.tempfile_in(folder).map_err(Error::io(path, "create"))?;
+        let temporary = temporary_in(folder_of(&target)).map_err(Error::io(path, "create"))?;
         let unfinished = Unfinished::new(temporary.path());
         Ok(Self { path: path.to_owned(), target, temporary, unfinished })
     }
@@ -86,23 +131,52 @@ impl AtomicFile {
         &self.path
     }
 
-    /// Makes the file durable, then puts it in the target's place in one step.
+    /// Makes the file durable, then puts it in the target's place in one step, and makes that durable.
     ///
     /// # Errors
-    /// [`Error::Io`]; the target is then what it was before.
+    /// [`Error::Io`]; the target is then what it was before, or (action "make durable") already the new file.
     pub fn commit(self) -> Result<(), Error> {
-        self.temporary.as_file().sync_all().map_err(Error::io(&self.path, "write"))?;
         let Self { path, target, temporary, unfinished } = self;
+        sync(temporary.as_file()).map_err(Error::io(&path, "write"))?;
+        let folder = folder_of(&target).to_owned();
         let lock = all_unfinished();
-        let persisted = temporary.persist(target);
+        let persisted = persist(temporary, &target);
         drop(lock);
         drop(unfinished);
-        persisted.map_err(|failure| Error::io(&path, "replace")(failure.error))?;
-        Ok(())
+        persisted.map_err(Error::io(&path, "replace"))?;
+        sync_folder(&folder).map_err(Error::io(&path, "make durable"))
     }
 
     fn file(&mut self) -> &mut File {
         self.temporary.as_file_mut()
+    }
+}
+
+fn sync(file: &File) -> io::Result<()> {
+    #[cfg(test)]
+    faults::on_sync()?;
+    file.sync_all()
+}
+
+fn persist(temporary: NamedTempFile, target: &Path) -> io::Result<()> {
+    #[cfg(test)]
+    faults::on_rename()?;
+    temporary.persist(target).map_err(|failure| failure.error)?;
+    Ok(())
+}
+
+/// Makes the names in a folder durable, where the system lets one.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    if !cfg!(unix) {
+        return Ok(());
+    }
+    // A folder may be writable and not readable; and some file systems cannot do it.
+    let Ok(folder) = File::open(folder) else { return Ok(()) };
+    match folder.sync_all() {
+        Err(error) if !matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => {
+            Err(error)
+        }
+        _ => Ok(()),
     }
 }
 
@@ -114,6 +188,8 @@ impl Read for AtomicFile {
 
 impl Write for AtomicFile {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        #[cfg(test)]
+        let buffer = faults::on_write(buffer)?;
         self.file().write(buffer)
     }
 
@@ -180,6 +256,22 @@ mod tests {
         file.commit().unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn what_the_dead_leave_behind_is_removed_and_the_living_keep_theirs() {
+        let folder = tempfile::tempdir().unwrap();
+        let [dead, other] = [".splat-dead.tmp", "splat-other.tmp"].map(|name| folder.path().join(name));
+        fs::write(&dead, "half").unwrap();
+        fs::write(&other, "somebody else's").unwrap();
+        let path = folder.path().join("picture.png");
+        let mut living = AtomicFile::create(&path).unwrap();
+        remove_leftovers(&path);
+        assert!(!dead.exists() && other.exists());
+        living.write_all(b"new").unwrap();
+        living.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

@@ -22,7 +22,7 @@ mod tests;
 mod trained;
 mod transforms;
 
-pub use own::{parse_camera_json, read_camera_json, write_camera_json, write_cameras_json};
+pub use own::{camera_json, parse_camera_json, read_camera_json, write_camera_json, write_cameras_json};
 
 use crate::error::quoted;
 use crate::{Error, Place};
@@ -128,7 +128,15 @@ struct Keys {
 
 /// Reads cameras from JSON or a `.log` trajectory.
 fn read_text_file(path: &Path, defaults: &CameraDefaults) -> Result<CameraSet, Error> {
-    let text = &read_text(path, MOST_MEBIBYTES)?;
+    parse_cameras(&read_text(path, MOST_MEBIBYTES)?, path, defaults)
+}
+
+/// Reads cameras from the text of a JSON file or of a `.log` trajectory; `path` is its name in messages, and where a
+/// `transforms.json` looks for its images.
+///
+/// # Errors
+/// As [`read_cameras`], but for what belongs to files; a list of no camera is none.
+pub fn parse_cameras(text: &str, path: &Path, defaults: &CameraDefaults) -> Result<CameraSet, Error> {
     match text.trim_ascii_start().bytes().next() {
         Some(b'{') => {
             let keys: Keys = from_json(text, path)?;

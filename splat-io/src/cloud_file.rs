@@ -1,12 +1,11 @@
 //! Clouds of any format behind one door.
 
-use crate::las::{self, read_las_from, write_las};
-use crate::pcd::read_pcd_from;
+use crate::las::{self, read_las, write_las};
+use crate::pcd::read_pcd;
 use crate::ply::{PlyEncoding, open, read_ply, write_ply};
 use crate::points3d::{find_points3d, read_points3d};
-use crate::text::{read_text_from, write_text};
+use crate::text::{read_text, write_text};
 use crate::trained::{read_splat, read_spz, spz, write_splat};
-use crate::whole_file::read_whole;
 use crate::{Error, Import};
 use splat_core::{Cloud, Field, Shapes};
 use std::io::Read;
@@ -48,12 +47,12 @@ const HEAD_BYTES: u64 = 4096;
 pub fn read_cloud(path: &Path, options: &CloudOptions) -> Result<Import, Error> {
     match cloud_format(path)? {
         CloudFormat::Ply => read_ply(path),
-        CloudFormat::Las => read_las_from(&read_whole(path)?, path),
-        CloudFormat::Pcd => read_pcd_from(&read_whole(path)?, path),
+        CloudFormat::Las => read_las(path),
+        CloudFormat::Pcd => read_pcd(path),
         CloudFormat::Spz => read_spz(path),
         CloudFormat::Splat => read_splat(path),
         CloudFormat::Points3d => read_points3d(&find_points3d(path).unwrap_or_else(|| path.to_owned())),
-        CloudFormat::Text => read_text_from(&read_whole(path)?, path, options.columns.as_deref()),
+        CloudFormat::Text => read_text(path, options.columns.as_deref()),
     }
 }
 

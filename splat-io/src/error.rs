@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// Why a file cannot be read or written.
 ///
 /// Every message is whole: it names the file and holds the cause's own words. Hence no error has a `source`,
-/// which a program that prints chains would say twice.
+/// which a program that prints chains would say twice. What a message repeats of a file is short and of one line,
+/// whatever the file holds.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused: the blame lies outside the file's contents.
@@ -21,7 +22,7 @@ pub enum Error {
         cause: io::Error,
     },
     /// The file may well be right, but this version cannot do it.
-    #[error("{}: {found} is not supported, expected {expected}", path.display())]
+    #[error("{}: {} is not supported, expected {}", path.display(), Shown(found), Shown(expected))]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -31,7 +32,7 @@ pub enum Error {
         expected: String,
     },
     /// The file breaks the rules of its format.
-    #[error("{}: {place}: found {found}, expected {expected}", path.display())]
+    #[error("{}: {place}: found {}, expected {}", path.display(), Shown(found), Shown(expected))]
     Invalid {
         /// The file.
         path: PathBuf,
@@ -43,7 +44,7 @@ pub enum Error {
         expected: String,
     },
     /// The file asks for more than this version allows.
-    #[error("{}: {what} is beyond the limit of {limit}", path.display())]
+    #[error("{}: {} is beyond the limit of {limit}", path.display(), Shown(what))]
     Limit {
         /// The file.
         path: PathBuf,
@@ -54,7 +55,7 @@ pub enum Error {
     },
     /// Not JSON, or not the JSON expected; the cause names line, column, what was found and what was
     /// expected.
-    #[error("{}: {cause}", path.display())]
+    #[error("{}: {}", path.display(), Shown(&cause.to_string()))]
     Json {
         /// The file.
         path: PathBuf,
@@ -114,7 +115,9 @@ impl fmt::Display for Place {
             Self::File => write!(f, "whole file"),
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(byte) => write!(f, "byte {byte}"),
-            Self::Row { element, row, byte } => write!(f, "row {row} of element {element}, byte {byte}"),
+            Self::Row { element, row, byte } => {
+                write!(f, "row {row} of element {}, byte {byte}", Shown(element))
+            }
             Self::Field(field) => write!(f, "field {field}"),
             Self::Camera { name, field: None } => write!(f, "camera {}", quoted(name.as_bytes())),
             Self::Camera { name, field: Some(field) } => {
@@ -170,10 +173,45 @@ impl Error {
     }
 }
 
+/// A text that may repeat what a file holds, as it may appear in a message: no control characters, its middle left out if
+/// it is long.
+struct Shown<'a>(&'a str);
+
+impl fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const MOST: usize = 400;
+        const KEPT: usize = 150;
+        let count = self.0.chars().count();
+        let is_kept = |place: usize| count <= MOST || place < KEPT || place >= count - KEPT;
+        for (place, c) in self.0.chars().enumerate() {
+            match c {
+                _ if place == KEPT && !is_kept(place) => f.write_str(" .. ")?,
+                _ if !is_kept(place) => {}
+                _ if c.is_control() => write!(f, "{}", c.escape_default())?,
+                _ => write!(f, "{c}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Bytes of a file as they may appear in a message: in backquotes, on one line, shortened, nothing raw.
 pub(crate) fn quoted(bytes: &[u8]) -> String {
     const MOST: usize = 40;
     let shown = &bytes[..bytes.len().min(MOST)];
     let more = if bytes.len() > MOST { ".." } else { "" };
     format!("`{}{more}`", shown.escape_ascii())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_holds_cannot_spoil_a_message() {
+        let long = format!("a\u{1b}[31m\n{}\u{e9}z", "\u{e9}".repeat(1000));
+        let error = Error::invalid(Path::new("x"), Place::Line(1), long, "y").to_string();
+        assert!(error.starts_with("x: line 1: found a\\u{1b}[31m\\n\u{e9}"), "{error}");
+        assert!(error.ends_with("\u{e9}z, expected y") && error.len() < 700, "{error}");
+    }
 }

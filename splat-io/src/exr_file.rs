@@ -11,11 +11,14 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::prelude::{Blocks, Encoding, Image, Layer, SmallVec, Vec2, WritableImage, f16};
-use glam::{DMat4, Vec3};
-use splat_core::Film;
+use glam::{DMat4, DVec3, Vec3};
+use splat_core::{Ending, Film, PixelRect, SampleSums};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+pub mod picture;
 
 /// How an EXR file is packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,19 +76,24 @@ impl Compression {
 /// The metadata become the attributes `software`, `xDensity` (pixels an inch), `worldToCamera` (the standard one, for row vectors, 32-bit
 /// floats) and, where those lose digits, `worldToCameraText` (rows listed, for column vectors), `samples` (an
 /// integer; the others are texts), `sampleRange` ("A:B", half open), `seed`, `engine`, `options`,
-/// `inputHash`; where there are positions, `positionOrigin` ("X Y Z", to be added to `P`). The same film and
-/// metadata give the same bytes.
+/// `inputHash`, `camera` (our JSON); where there are positions, `positionOrigin` ("X Y Z", to be added to `P`). The
+/// same film and metadata give the same bytes.
+///
+/// A film with [`Film::sums`] has these in channels `sums.NAME.high` and `sums.NAME.low`, the upper and lower half of the bits
+/// of an `f64`, and in the attributes `sumsBackground` ("R G B A" or "none") and `sumsSpace` ("linear", or "sRGB" for
+/// `--resolve over`) what else is needed to join it with the film of the other samples ([`crate::merge()`]).
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Core`] if the film is empty or its arrays do not fit its window;
 /// [`Error::Encode`].
 pub fn write_exr(path: &Path, film: &Film, metadata: &Metadata, options: &ExrOptions) -> Result<(), Error> {
     let channels = Channels::new(film, options.full_floats).map_err(Error::core(path))?;
-    write_channels(path, film, channels, metadata, options)
+    write_channels(path, &Place::of(film, true), channels, metadata, options)
 }
 
 /// Writes each of the film's AOVs as an EXR file of its own beside the picture `path`: for `out.exr` or `out.png` the files
-/// `out.depth.exr`, `out.normal.exr` and so on, with the channels that [`write_exr`] gives them. Returns their paths.
+/// `out.depth.exr`, `out.normal.exr` and so on, with the channels that [`write_exr`] gives them, save sums. Returns their
+/// paths.
 ///
 /// # Errors
 /// As [`write_exr`].
@@ -99,10 +107,10 @@ pub fn write_aov_files(
     channels
         .by_aov()
         .into_iter()
-        .filter(|(aov, _)| *aov != COLOR)
+        .filter(|(aov, _)| aov != COLOR && aov != SUMS)
         .map(|(aov, channels)| {
             let path = path.with_extension(format!("{aov}.exr"));
-            write_channels(&path, film, channels, metadata, options)?;
+            write_channels(&path, &Place::of(film, false), channels, metadata, options)?;
             Ok(path)
         })
         .collect()
@@ -120,26 +128,48 @@ pub fn write_color_exr(
 ) -> Result<(), Error> {
     let mut channels = Channels::new(film, options.full_floats).map_err(Error::core(path))?;
     channels.0.retain(|channel| channel.aov() == COLOR);
-    write_channels(path, film, channels, metadata, options)
+    write_channels(path, &Place::of(film, false), channels, metadata, options)
+}
+
+/// Where the pixels of a picture are, and what belongs to its channels.
+struct Place {
+    frame: [u32; 2],
+    window: PixelRect,
+    /// To be added to positions, if there are some.
+    position_origin: Option<DVec3>,
+    /// What becomes of sums, if there are some.
+    ending: Option<Ending>,
+}
+
+impl Place {
+    fn of(film: &Film, with_sums: bool) -> Self {
+        Self {
+            frame: film.frame,
+            window: film.window,
+            position_origin: film.position.as_ref().map(|_| film.position_origin),
+            ending: film.sums.as_ref().filter(|_| with_sums).map(|sums| sums.ending),
+        }
+    }
 }
 
 fn write_channels(
     path: &Path,
-    film: &Film,
+    place: &Place,
     channels: Channels<'_>,
     metadata: &Metadata,
     options: &ExrOptions,
 ) -> Result<(), Error> {
-    let attributes = layer_attributes(film, metadata);
+    let attributes = layer_attributes(place, metadata);
     let encoding = Encoding {
         compression: options.compression.encoding(),
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let frame = Vec2(film.frame[0] as usize, film.frame[1] as usize);
+    let frame = Vec2(place.frame[0] as usize, place.frame[1] as usize);
+    let size = (place.window.width(), place.window.height());
     let image = Image {
         attributes: ImageAttributes::new(IntegerBounds::from_dimensions(frame)),
-        layer_data: Layer::new((film.width(), film.height()), attributes, encoding, channels),
+        layer_data: Layer::new(size, attributes, encoding, channels),
     };
 
     let mut file = AtomicFile::create(path)?;
@@ -160,8 +190,8 @@ fn write_channels(
     file.commit()
 }
 
-fn layer_attributes(film: &Film, metadata: &Metadata) -> LayerAttributes {
-    let mut attributes = LayerAttributes::default().with_position(Vec2(film.window.x0, film.window.y0));
+fn layer_attributes(place: &Place, metadata: &Metadata) -> LayerAttributes {
+    let mut attributes = LayerAttributes::default().with_position(Vec2(place.window.x0, place.window.y0));
     attributes.horizontal_density = metadata.pixels_per_inch.map(|density| density as f32);
     attributes.software_name = metadata.software.as_deref().map(text);
     let mut add = |name: &str, value: AttributeValue| _ = attributes.other.insert(text(name), value);
@@ -181,9 +211,14 @@ fn layer_attributes(film: &Film, metadata: &Metadata) -> LayerAttributes {
     add_text("engine", metadata.engine.clone());
     add_text("options", metadata.options.clone());
     add_text("inputHash", metadata.input_hash.clone());
-    let origin = film.position_origin;
-    let origin_text = || format!("{} {} {}", origin.x, origin.y, origin.z);
-    add_text("positionOrigin", film.position.as_ref().map(|_| origin_text()));
+    add_text("camera", metadata.camera.clone());
+    let numbers = |origin: DVec3| format!("{} {} {}", origin.x, origin.y, origin.z);
+    add_text("positionOrigin", place.position_origin.map(numbers));
+    if let Some(Ending { background, display_space }) = place.ending {
+        let numbers = background.map(|color| color.map(|value| value.to_string()).join(" "));
+        add_text("sumsBackground", Some(numbers.unwrap_or_else(|| "none".to_owned())));
+        add_text("sumsSpace", Some(if display_space { "sRGB" } else { "linear" }.to_owned()));
+    }
     if let Some(matrix) = metadata.world_to_camera {
         if matrix.as_mat4().as_dmat4() != matrix {
             add_text("worldToCameraText", Some(Metadata::matrix_text(&matrix)));
@@ -206,11 +241,14 @@ fn text(text: &str) -> Text {
 /// The name of what is no AOV.
 const COLOR: &str = "color";
 
+/// The layer of the sums.
+const SUMS: &str = "sums";
+
 /// The channels of a film, in the order of the file: by name.
 struct Channels<'a>(Vec<Channel<'a>>);
 
 struct Channel<'a> {
-    name: &'static str,
+    name: Cow<'a, str>,
     kind: SampleType,
     values: Values<'a>,
 }
@@ -220,7 +258,12 @@ enum Values<'a> {
     Color(&'a [[f32; 4]], usize),
     Vector(&'a [Vec3], usize),
     Scalar(&'a [f32]),
+    Half(&'a [f16]),
     Id(&'a [u32]),
+    /// The upper half of the bits.
+    High(&'a [f64]),
+    /// The lower half of the bits.
+    Low(&'a [f64]),
 }
 
 impl<'a> Channels<'a> {
@@ -229,7 +272,7 @@ impl<'a> Channels<'a> {
         let float = if full_floats { SampleType::F32 } else { SampleType::F16 };
         let mut channels = Vec::new();
         for (component, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
-            channels.push(Channel { name, kind: float, values: Values::Color(&film.rgba, component) });
+            channels.push(Channel::new(name, float, Values::Color(&film.rgba, component)));
         }
         let vectors = [
             (&film.normal, float, ["N.X", "N.Y", "N.Z"]),
@@ -241,7 +284,7 @@ impl<'a> Channels<'a> {
             let Some(vectors) = vectors else { continue };
             check_length(names[0], vectors.len(), film)?;
             for (component, name) in names.into_iter().enumerate() {
-                channels.push(Channel { name, kind, values: Values::Vector(vectors, component) });
+                channels.push(Channel::new(name, kind, Values::Vector(vectors, component)));
             }
         }
         let scalars = [
@@ -253,30 +296,47 @@ impl<'a> Channels<'a> {
         for (scalars, kind, name) in scalars {
             let Some(scalars) = scalars else { continue };
             check_length(name, scalars.len(), film)?;
-            channels.push(Channel { name, kind, values: Values::Scalar(scalars) });
+            channels.push(Channel::new(name, kind, Values::Scalar(scalars)));
         }
         if let Some(ids) = &film.id {
             check_length("id", ids.len(), film)?;
-            channels.push(Channel { name: "id", kind: SampleType::U32, values: Values::Id(ids) });
+            channels.push(Channel::new("id", SampleType::U32, Values::Id(ids)));
         }
-        channels.sort_unstable_by_key(|channel| channel.name);
+        if let Some(sums) = &film.sums {
+            for (name, plane) in SampleSums::names(sums.aovs).zip(&sums.planes) {
+                check_length("sums", plane.len(), film)?;
+                let [high, low] = sum_names(name);
+                channels.push(Channel::new(high, SampleType::U32, Values::High(plane)));
+                channels.push(Channel::new(low, SampleType::U32, Values::Low(plane)));
+            }
+        }
+        channels.sort_unstable_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(channels))
     }
 
     /// The channels of each AOV, by its name.
-    fn by_aov(self) -> BTreeMap<&'static str, Self> {
+    fn by_aov(self) -> BTreeMap<String, Self> {
         let mut aovs: BTreeMap<_, Self> = BTreeMap::new();
         for channel in self.0 {
-            aovs.entry(channel.aov()).or_insert_with(|| Self(Vec::new())).0.push(channel);
+            aovs.entry(channel.aov().to_owned()).or_insert_with(|| Self(Vec::new())).0.push(channel);
         }
         aovs
     }
 }
 
-impl Channel<'_> {
+/// The names of the channels of a sum.
+fn sum_names(name: &str) -> [String; 2] {
+    ["high", "low"].map(|half| format!("{SUMS}.{name}.{half}"))
+}
+
+impl<'a> Channel<'a> {
+    fn new(name: impl Into<Cow<'a, str>>, kind: SampleType, values: Values<'a>) -> Self {
+        Self { name: name.into(), kind, values }
+    }
+
     /// The AOV that it belongs to, as `--aov` names it.
-    fn aov(&self) -> &'static str {
-        match self.name.split_once('.').map_or(self.name, |(layer, _)| layer) {
+    fn aov(&self) -> &str {
+        match self.name.split_once('.').map_or(&*self.name, |(layer, _)| layer) {
             "R" | "G" | "B" | "A" => COLOR,
             "N" => "normal",
             "P" => "position",
@@ -296,6 +356,13 @@ impl Channel<'_> {
                 self.write_floats(bytes, vectors[start..].iter().map(|vector| vector[*component]));
             }
             Values::Scalar(scalars) => self.write_floats(bytes, scalars[start..].iter().copied()),
+            Values::Half(halves) => fill(bytes, halves[start..].iter().map(|half| half.to_ne_bytes())),
+            Values::High(plane) => {
+                fill(bytes, plane[start..].iter().map(|&value| halves(value)[0].to_ne_bytes()));
+            }
+            Values::Low(plane) => {
+                fill(bytes, plane[start..].iter().map(|&value| halves(value)[1].to_ne_bytes()));
+            }
         }
     }
 
@@ -305,6 +372,12 @@ impl Channel<'_> {
             SampleType::F32 | SampleType::U32 => fill(bytes, values.map(f32::to_ne_bytes)),
         }
     }
+}
+
+/// The upper and the lower half of a number's bits.
+fn halves(value: f64) -> [u32; 2] {
+    let bits = value.to_bits();
+    [(bits >> 32) as u32, bits as u32]
 }
 
 /// The nearest 16-bit float, the greatest one for all beyond it.
@@ -322,7 +395,7 @@ impl<'a> WritableChannels<'a> for Channels<'a> {
     type Writer = &'a Self;
 
     fn infer_channel_list(&self) -> ChannelList {
-        let description = |channel: &Channel| ChannelDescription::new(channel.name, channel.kind, false);
+        let description = |channel: &Channel| ChannelDescription::new(&*channel.name, channel.kind, false);
         ChannelList::new(self.0.iter().map(description).collect::<SmallVec<_>>())
     }
 

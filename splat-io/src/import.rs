@@ -28,6 +28,32 @@ pub struct ImportReport {
     pub elements: Vec<ElementReport>,
     /// What was assumed, a sentence each.
     pub assumptions: Vec<String>,
+    /// What was passed over or changed because it is out of order: a strict caller refuses the file.
+    pub losses: Vec<Loss>,
+}
+
+/// Something in a file that was passed over or changed, so that the rest can be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Loss {
+    /// What, in the plural: "opacities outside [0, 1]".
+    pub what: String,
+    /// How many.
+    pub count: u64,
+    /// Where the first one is: "point 17", counted from 0 as the rows of a file are.
+    pub first: String,
+}
+
+impl Loss {
+    /// So many of these, the first of them there; `None` if there is none.
+    pub fn new(what: impl Into<String>, count: u64, first: impl Into<String>) -> Option<Self> {
+        (count > 0).then(|| Self { what: what.into(), count, first: first.into() })
+    }
+}
+
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} (the first: {})", self.count, self.what, self.first)
+    }
 }
 
 /// One table of a file.

@@ -16,6 +16,7 @@
 //! Uncompressed points are decoded here. Compressed ones go through the crate `laz`, chunk by chunk, after every
 //! size that the file claims was held against its own.
 
+mod gps_time;
 mod header;
 mod laz_points;
 mod points;
@@ -49,7 +50,7 @@ pub(crate) const FIELD_NAMES: [&str; 7] = [
 /// [`Error::Invalid`] for anything malformed or truncated, or claiming more points than the file can hold;
 /// [`Error::Limit`] for 2^32 - 1 points or more, or more than memory.
 pub fn read_las(path: &Path) -> Result<Import, Error> {
-    read_las_from(&read_whole(path)?, path)
+    read_las_from(&read_whole(path, header::check_magic)?, path)
 }
 
 /// Reads a cloud from the bytes of a LAS or LAZ file; `path` is its name in messages.
@@ -73,6 +74,7 @@ pub fn read_las_from(bytes: &[u8], path: &Path) -> Result<Import, Error> {
         sha256: sha256(bytes),
         elements: vec![ElementReport { name: "points".to_owned(), count, is_points: true, properties }],
         assumptions,
+        losses: Vec::new(),
     };
     Ok(Import { cloud, report })
 }

@@ -1,6 +1,7 @@
 //! What a picture file says about how it was made.
 
 use glam::DMat4;
+use splat_core::PixelRect;
 use std::ops::Range;
 
 /// How a picture was made. Every field is optional; what is `None` is not written.
@@ -22,8 +23,12 @@ pub struct Metadata {
     pub options: Option<String>,
     /// Pixels an inch of a print, across and down.
     pub pixels_per_inch: Option<f64>,
-    /// SHA-256 of the input, in hexadecimal.
+    /// SHA-256 of the inputs, in hexadecimal.
     pub input_hash: Option<String>,
+    /// The camera, as our JSON has it: [`crate::camera_json`].
+    pub camera: Option<String>,
+    /// The pixels of the frame that were rendered, if not all; EXR files say so by their data window.
+    pub crop: Option<PixelRect>,
 }
 
 impl Metadata {
@@ -38,6 +43,8 @@ impl Metadata {
             ("seed", self.seed.map(|seed| seed.to_string())),
             ("engine", self.engine.clone()),
             ("inputHash", self.input_hash.clone()),
+            ("camera", self.camera.clone()),
+            ("crop", self.crop.map(|PixelRect { x0, y0, x1, y1 }| format!("{x0},{y0},{x1},{y1}"))),
         ];
         texts.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
     }

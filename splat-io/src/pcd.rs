@@ -14,7 +14,7 @@ mod tests;
 use crate::error::quoted;
 use crate::table::{Columns, Element, Hints, Kind, Outcome, Property, Row, SLOTS, Scalar};
 use crate::whole_file::{bytes_at, read_whole, sha256};
-use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, Usage};
+use crate::{ElementReport, Error, Import, ImportReport, Loss, Place, PropertyReport, Usage};
 use header::{Data, Field, Header, Type};
 use std::borrow::Cow;
 use std::path::Path;
@@ -25,7 +25,8 @@ use std::path::Path;
 /// [`Error::Io`]; [`Error::Invalid`] for anything malformed, truncated, or claiming more points than the file can hold;
 /// [`Error::Limit`] for 2^32 - 1 points or more, or more than memory.
 pub fn read_pcd(path: &Path) -> Result<Import, Error> {
-    read_pcd_from(&read_whole(path)?, path)
+    let has_header = |head: &[u8], path: &Path| Header::read(head, path).map(drop);
+    read_pcd_from(&read_whole(path, has_header)?, path)
 }
 
 /// Reads a cloud from the bytes of a PCD file; `path` is its name in messages.
@@ -47,10 +48,13 @@ pub fn read_pcd_from(bytes: &[u8], path: &Path) -> Result<Import, Error> {
     let slots: Vec<Option<usize>> = table.roles.slots.clone();
     let used: Vec<(Column, usize)> =
         used.into_iter().zip(slots).filter_map(|(column, slot)| Some((column, slot?))).collect();
-    match &body {
+    let more = match &body {
         Body::Text(text) => read_text(text, &header, &used, &mut table, path)?,
-        Body::Binary { rows, places } => read_binary(rows, places, &header, &used, &mut table),
-    }
+        Body::Binary { rows, places, more } => {
+            read_binary(rows, places, &header, &used, &mut table);
+            more.clone()
+        }
+    };
     let mut outcome = table.finish(Hints::default());
     let mut assumptions = std::mem::take(&mut outcome.assumptions);
     assumptions.append(&mut outcome.color_assumptions);
@@ -69,6 +73,7 @@ pub fn read_pcd_from(bytes: &[u8], path: &Path) -> Result<Import, Error> {
         sha256: sha256(bytes),
         elements: vec![report(&header, &element, &outcome)],
         assumptions,
+        losses: outcome.losses.into_iter().chain(more).collect(),
     };
     Ok(Import { cloud: outcome.cloud, report })
 }
@@ -113,6 +118,8 @@ enum Body<'a> {
         rows: Cow<'a, [u8]>,
         /// Of each field: where its first number is, and from each to the next one, in bytes.
         places: Vec<(usize, usize)>,
+        /// What stands behind the last row.
+        more: Option<Loss>,
     },
 }
 
@@ -144,7 +151,9 @@ impl<'a> Body<'a> {
                     *end += field.bytes * field.count;
                     Some((start, row_bytes))
                 });
-                Ok(Self::Binary { rows: Cow::Borrowed(&body[..claimed as usize]), places: starts.collect() })
+                let (rows, more) = body.split_at(claimed as usize);
+                let more = behind(more, header.body + rows.len());
+                Ok(Self::Binary { rows: Cow::Borrowed(rows), places: starts.collect(), more })
             }
             Data::Compressed => {
                 let sizes = bytes_at::<4>(body, 0).zip(bytes_at::<4>(body, 4));
@@ -153,7 +162,7 @@ impl<'a> Body<'a> {
                 else {
                     return too_few(format!("{} bytes", body.len()), header.body);
                 };
-                let Some(packed) = body[8..].get(..packed as usize) else {
+                let Some((packed, more)) = body[8..].split_at_checked(packed as usize) else {
                     return too_few(
                         format!("{} bytes, of {packed} compressed ones", body.len()),
                         header.body,
@@ -177,10 +186,16 @@ impl<'a> Body<'a> {
                     *end += size * points;
                     Some((start, field.bytes * field.count))
                 });
-                Ok(Self::Binary { places: places.collect(), rows: Cow::Owned(rows) })
+                let more = behind(more, header.body + 8 + packed.len());
+                Ok(Self::Binary { places: places.collect(), rows: Cow::Owned(rows), more })
             }
         }
     }
+}
+
+/// Bytes behind the points, from this byte of the file on.
+fn behind(more: &[u8], start: usize) -> Option<Loss> {
+    Loss::new("bytes behind the last point", more.len() as u64, format!("byte {start}"))
 }
 
 fn read_binary(
@@ -215,7 +230,7 @@ fn read_text(
     used: &[(Column, usize)],
     table: &mut Columns,
     path: &Path,
-) -> Result<(), Error> {
+) -> Result<Option<Loss>, Error> {
     let width: usize = header.fields.iter().map(|field| field.count).sum();
     let starts: Vec<usize> = header
         .fields
@@ -268,7 +283,11 @@ fn read_text(
         }
         table.push(&values);
     }
-    Ok(())
+    let mut more = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
+    let first = more.next().map(|(number, _)| number);
+    Ok(first.and_then(|line| {
+        Loss::new("lines behind the last point", 1 + more.count() as u64, format!("line {line}"))
+    }))
 }
 
 /// What is said of the fields.

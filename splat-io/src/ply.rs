@@ -45,11 +45,11 @@ pub use writer::{PlyEncoding, write_ply};
 use crate::mesh::MeshImport;
 use crate::source::Source;
 use crate::table::{Columns, Element, Outcome};
-use crate::{ElementReport, Error, Import, ImportReport, PropertyReport, Usage};
+use crate::{ElementReport, Error, Import, ImportReport, Loss, PropertyReport, Usage};
 use faces::Faces;
 use header::{Format, Header};
 use rows::{Table, Tables};
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::Path;
 
@@ -69,11 +69,15 @@ pub fn read_ply(path: &Path) -> Result<Import, Error> {
 
 /// Opens a regular file and gives its size, in bytes.
 pub(crate) fn open(path: &Path) -> Result<(File, u64), Error> {
+    // Asked before it is opened, too: to open a pipe is to wait for someone who writes to it.
+    let is_file = |metadata: &Metadata| {
+        let refusal = || Error::unsupported(path, "reading a folder, device or pipe", "a regular file");
+        if metadata.is_file() { Ok(()) } else { Err(refusal()) }
+    };
+    is_file(&path.metadata().map_err(Error::io(path, "open"))?)?;
     let file = File::open(path).map_err(Error::io(path, "open"))?;
     let metadata = file.metadata().map_err(Error::io(path, "read"))?;
-    if !metadata.is_file() {
-        return Err(Error::unsupported(path, "reading a folder, device or pipe", "a regular file"));
-    }
+    is_file(&metadata)?;
     Ok((file, metadata.len()))
 }
 
@@ -93,9 +97,10 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
     let mut tables = Surfels::new(&header, false, &source)?;
     read_tables(&header, &mut source, &mut tables)?;
     let points = tables.points;
+    let more = behind(&header, tables.end(), &mut source)?;
     let (sha256, bytes) = source.finish()?;
 
-    let Outcome { mut cloud, usages, mut assumptions, color_assumptions } =
+    let Outcome { mut cloud, usages, mut assumptions, color_assumptions, losses } =
         tables.columns.finish(header.hints());
     cloud.trained = header.trained;
     assumptions.extend(color_assumptions);
@@ -114,6 +119,7 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
         sha256,
         elements: elements.collect(),
         assumptions,
+        losses: losses.into_iter().chain(more).collect(),
     };
     Ok(Import { cloud, report })
 }
@@ -123,9 +129,18 @@ pub fn read_ply_from(reader: impl Read, size: u64, path: &Path) -> Result<Import
 /// # Errors
 /// As [`read_ply`], as far as the header goes.
 pub fn ply_has_faces(path: &Path) -> Result<bool, Error> {
-    let (file, size) = open(path)?;
-    let header = Header::read(&mut Source::new(file, size, path))?;
+    let header = header_of(path)?;
     Ok(Faces::find(&header).is_some_and(|index| header.elements[index].count > 0))
+}
+
+/// The tables of a PLY file.
+pub(crate) fn elements_of(path: &Path) -> Result<Vec<Element>, Error> {
+    Ok(header_of(path)?.elements)
+}
+
+fn header_of(path: &Path) -> Result<Header, Error> {
+    let (file, size) = open(path)?;
+    Header::read(&mut Source::new(file, size, path))
 }
 
 /// Reads a mesh from a PLY file: the vertices as [`read_ply`] does, and the faces between them.
@@ -150,10 +165,11 @@ pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<M
     let header = Header::read(&mut source)?;
     let mut tables = Surfels::new(&header, true, &source)?;
     read_tables(&header, &mut source, &mut tables)?;
+    let more = behind(&header, tables.end(), &mut source)?;
     let (sha256, bytes) = source.finish()?;
 
     let points = tables.points;
-    let Outcome { cloud, usages, color_assumptions, .. } = tables.columns.finish(header.hints());
+    let Outcome { cloud, usages, color_assumptions, losses, .. } = tables.columns.finish(header.hints());
     let Some((faces_index, faces)) = tables.faces else {
         return Err(Faces::missing(path));
     };
@@ -171,6 +187,7 @@ pub fn read_ply_mesh_from(reader: impl Read, size: u64, path: &Path) -> Result<M
         sha256,
         elements: elements.collect(),
         assumptions: color_assumptions,
+        losses: losses.into_iter().chain(faces.losses()).chain(more).collect(),
     };
     Ok(MeshImport { mesh: faces.into_mesh(&cloud), report })
 }
@@ -222,6 +239,19 @@ fn read_tables<R: Read>(
         Format::BinaryLittleEndian => binary::read::<_, false>(source, header, tables),
         Format::BinaryBigEndian => binary::read::<_, true>(source, header, tables),
     }
+}
+
+/// What stands behind the last table of a file, if so many tables that were read are all; blanks behind text are nothing.
+fn behind<R: Read>(header: &Header, read: usize, source: &mut Source<R>) -> Result<Option<Loss>, Error> {
+    let (mut count, start) = (0, source.offset());
+    let is_text = header.format == Format::Ascii;
+    while read == header.elements.len() && source.want(1)? {
+        let window = source.window();
+        let bytes = window.iter().filter(|byte| !(is_text && byte.is_ascii_whitespace())).count();
+        count += bytes as u64;
+        source.consume(source.window().len());
+    }
+    Ok(Loss::new("bytes behind the last row", count, format!("from byte {start} on")))
 }
 
 /// What is said of an element; `usages`, one a property, if it is the table of points.

@@ -130,6 +130,14 @@ fn encode_pixel16([red, green, blue, alpha]: [f32; 4]) -> [u16; 4] {
     [straight(red), straight(green), straight(blue), level16(alpha.into())]
 }
 
+/// The levels of a linear, premultiplied color.
+pub(crate) fn display_levels(pixel: [f32; 4], depth: PngDepth) -> [u16; 4] {
+    match depth {
+        PngDepth::Eight => encode_pixel(pixel).map(u16::from),
+        PngDepth::Sixteen => encode_pixel16(pixel),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

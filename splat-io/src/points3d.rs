@@ -64,6 +64,7 @@ pub fn read_points3d(path: &Path) -> Result<Import, Error> {
         sha256,
         elements: vec![ElementReport { name: "points3D".to_owned(), count, is_points: true, properties }],
         assumptions: vec!["colours are 8-bit sRGB".to_owned()],
+        losses: Vec::new(),
     };
     Ok(Import { cloud, report })
 }

@@ -85,6 +85,10 @@ impl<R: Read> Source<R> {
         self.end -= self.start;
         self.start = 0;
         if wanted > self.buffer.len() {
+            if self.buffer.try_reserve_exact(wanted - self.buffer.len()).is_err() {
+                let what = format!("a part of {wanted} bytes");
+                return Err(Error::limit(&self.path, what, "this machine's memory"));
+            }
             self.buffer.resize(wanted, 0);
         }
         while self.end < wanted && !self.ended {

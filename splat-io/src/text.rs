@@ -18,7 +18,7 @@ pub use writer::write_text;
 use crate::error::quoted;
 use crate::table::{Columns, Element, Hints, Kind, Outcome, Property, Row, SLOTS, Scalar, Tone};
 use crate::whole_file::{read_whole, sha256};
-use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, Usage};
+use crate::{ElementReport, Error, Import, ImportReport, Loss, Place, PropertyReport, Usage};
 use glam::Vec3;
 use layout::{Layout, is_comment};
 use std::path::Path;
@@ -36,7 +36,7 @@ pub const SKIPPED: &str = "-";
 /// number, a row of another length than the first one, columns without x, y or z, and fewer points than the file
 /// claims; [`Error::Limit`] for more points than memory.
 pub fn read_text(path: &Path, columns: Option<&[String]>) -> Result<Import, Error> {
-    read_text_from(&read_whole(path)?, path, columns)
+    read_text_from(&read_whole(path, check_text)?, path, columns)
 }
 
 /// Reads a cloud from the bytes of a text file; `path` is its name in messages.
@@ -53,7 +53,7 @@ pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> 
     let slots: Vec<Option<usize>> = layout.names.iter().map(slot).collect();
     element.count = read_rows(&mut layout, &slots, &mut columns, path)?;
     let Layout { names, separator, claimed, mut assumptions, .. } = layout;
-    check_claim(claimed, element.count, path, &mut assumptions)?;
+    let more = check_claim(claimed, element.count, path, &mut assumptions)?;
 
     let mut outcome = columns.finish(Hints::default());
     let tone = outcome.cloud.colors.as_deref_mut().map(linearise);
@@ -68,6 +68,7 @@ pub fn read_text_from(bytes: &[u8], path: &Path, columns: Option<&[String]>) -> 
         sha256: sha256(bytes),
         elements: vec![report(&names, &element, &outcome)],
         assumptions,
+        losses: outcome.losses.into_iter().chain(more).collect(),
     };
     Ok(Import { cloud: outcome.cloud, report })
 }
@@ -157,7 +158,7 @@ fn check_claim(
     read: u64,
     path: &Path,
     assumptions: &mut Vec<String>,
-) -> Result<(), Error> {
+) -> Result<Option<Loss>, Error> {
     match claimed {
         Some(claimed) if read < claimed => {
             let expected = format!("{claimed} points, as the file says");
@@ -165,9 +166,9 @@ fn check_claim(
         }
         Some(claimed) if read > claimed => {
             assumptions.push(format!("the file says {claimed} points and has {read}: all are kept"));
-            Ok(())
+            Ok(Loss::new("points more than the file says", read - claimed, format!("point {claimed}")))
         }
-        _ => Ok(()),
+        _ => Ok(None),
     }
 }
 

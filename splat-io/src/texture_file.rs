@@ -21,8 +21,8 @@
 //! A size that a header claims is held against limits ([`MAX_PIXELS`], 2^24 per axis) and against what so small a
 //! file can hold, before anything is allocated.
 
-mod exr;
-mod png;
+pub(crate) mod exr;
+pub(crate) mod png;
 #[cfg(test)]
 mod tests;
 
@@ -87,7 +87,7 @@ struct Image {
 
 /// What the first bytes of a file say.
 #[derive(Debug, PartialEq, Eq)]
-enum Format {
+pub(crate) enum Format {
     Png,
     Exr,
     /// A known format that is not read, with its article.
@@ -96,7 +96,7 @@ enum Format {
 }
 
 impl Format {
-    fn of(start: &[u8]) -> Self {
+    pub(crate) fn of(start: &[u8]) -> Self {
         if start.get(8..12) == Some(b"WEBP") && start.starts_with(b"RIFF") {
             return Self::Other("a WebP image");
         }

@@ -277,12 +277,9 @@ impl Lattice {
         let [middle, half] =
             [0.5 * (image.max[axis] + image.min[axis]) + origin, 0.5 * (image.max[axis] - image.min[axis])];
         // Three roundings of terms that may cancel.
-        let rounding = (middle.abs() + self.lens_radius * defocus.abs() + 64.0) * 4.0 * f64::from(f32::EPSILON);
-        Nearness {
-            middle: middle as f32,
-            half: (half + spread + rounding) as f32,
-            defocus: defocus as f32,
-        }
+        let rounding =
+            (middle.abs() + self.lens_radius * defocus.abs() + 64.0) * 4.0 * f64::from(f32::EPSILON);
+        Nearness { middle: middle as f32, half: (half + spread + rounding) as f32, defocus: defocus as f32 }
     }
 
     /// How far a splat reaches along an axis, for [`Reach::blocks`].

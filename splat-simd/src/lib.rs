@@ -21,4 +21,4 @@ pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};
 pub use lanes::Level;
-pub use render::{Renderer, render, SUMS, LAYERED, CELLS, TILES};
+pub use render::{Renderer, render};

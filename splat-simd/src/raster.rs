@@ -340,40 +340,53 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Adds the hits of a page to the sums of their cells. Returns the number of fragments.
     #[inline(always)]
     fn sum(&self, page: &Page<'_>, surface: &SplatSurface, sums: &mut SurfaceSums) -> u32 {
-        let (records, keys) = page.records_and_cells();
-        let mut misses = L::splat(0.0);
-        let lanes = L::CELLS * LANES;
+        let (records, keys) = page.records_and_keys();
+        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks::<2>();
         let (pair_keys, last_key) = keys.as_chunks::<2>();
         for ([first, second], keys) in pairs.iter().zip(pair_keys) {
-            let cells = keys.map(Key::list);
+            let [a, b] = keys.map(Key::list);
             if L::CELLS == 2 {
-                let depth = L::load_cells(&first.depth, &second.depth);
-                let weight = L::load_cells(&first.weight, &second.weight);
-                let (depth, weight) = self.weighed(depth, weight, &mut misses);
-                sums.add(cells, depth, weight, surface);
+                self.sum_cells([first, second], [a, b], surface, sums, &mut misses);
             } else {
-                for (record, cell) in [first, second].into_iter().zip(cells) {
-                    let (depth, weight) = self.weighed(L::load(&record.depth), L::load(&record.weight), &mut misses);
-                    sums.add([cell; 2], depth, weight, surface);
-                }
+                self.sum_cells([first; 2], [a; 2], surface, sums, &mut misses);
+                self.sum_cells([second; 2], [b; 2], surface, sums, &mut misses);
             }
         }
-        let mut counts = [[0.0; LANES]; 2];
+        if let ([record], [key]) = (last, last_key) {
+            self.sum_cells([record; 2], [key.list(); 2], surface, sums, &mut last_misses);
+        }
+        Self::count_hits(records.len(), misses, last_misses)
+    }
+
+    /// [`Self::sum`] for one record (given twice), or for two.
+    #[inline(always)]
+    fn sum_cells(
+        &self,
+        [first, second]: [&Record; 2],
+        cells: [usize; 2],
+        surface: &SplatSurface,
+        sums: &mut SurfaceSums,
+        misses: &mut L,
+    ) {
+        let depth = L::load_cells(&first.depth, &second.depth);
+        let r2 = L::load_cells(&first.weight, &second.weight);
+        let (depth, weight) = self.weighed(depth, r2, misses);
+        sums.add(cells, depth, weight, surface);
+    }
+
+    /// The number of hits in some records, given the misses in each lane: in pairs of records, and in the last one, of which
+    /// the first cell counts. Exact as long as a splat has fewer than 2^24 records.
+    #[inline(always)]
+    fn count_hits(records: usize, misses: L, last_misses: L) -> u32 {
+        let mut counts = [[0.0; LANES]; 3];
         misses.store_cell::<0>(&mut counts[0]);
         if L::CELLS == 2 {
             misses.store_cell::<1>(&mut counts[1]);
         }
-        let _ = lanes;
-        if let ([record], [key]) = (last, last_key) {
-            let mut misses = L::splat(0.0);
-            let (depth, weight) = self.weighed(L::load(&record.depth), L::load(&record.weight), &mut misses);
-            sums.add([key.list(); 2], depth, weight, surface);
-            let mut last = [0.0; LANES];
-            misses.store_cell::<0>(&mut last);
-            counts[0] = std::array::from_fn(|lane| counts[0][lane] + last[lane]);
-        }
-        (records.len() * LANES) as u32 - counts.as_flattened().iter().sum::<f32>() as u32
+        last_misses.store_cell::<0>(&mut counts[2]);
+        let counts: Eight = std::array::from_fn(|lane| counts[0][lane] + counts[1][lane] + counts[2][lane]);
+        (records * LANES) as u32 - counts.iter().sum::<f32>() as u32
     }
 
     /// Turns the r2 of some records into weights, and drops what weighs nothing. Returns the number of fragments left.
@@ -382,9 +395,8 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// at a time.
     #[inline(always)]
     fn weigh(&self, records: &mut [Record]) -> u32 {
-        let count = records.len() * LANES;
-        // Of each lane, exact as long as a splat has fewer than 2^24 records.
-        let mut misses = L::splat(0.0);
+        let count = records.len();
+        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks_mut::<2>();
         if L::CELLS == 2 {
             for [first, second] in pairs {
@@ -402,19 +414,10 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
                 self.weigh_one(second, &mut misses);
             }
         }
-        let mut sums = [[0.0; LANES]; 2];
-        misses.store_cell::<0>(&mut sums[0]);
-        if L::CELLS == 2 {
-            misses.store_cell::<1>(&mut sums[1]);
-        }
         if let [record] = last {
-            let mut misses = L::splat(0.0);
-            self.weigh_one(record, &mut misses);
-            let mut last = [0.0; LANES];
-            misses.store_cell::<0>(&mut last);
-            sums[0] = std::array::from_fn(|lane| sums[0][lane] + last[lane]);
+            self.weigh_one(record, &mut last_misses);
         }
-        (count as u32) - sums.as_flattened().iter().sum::<f32>() as u32
+        Self::count_hits(count, misses, last_misses)
     }
 
     /// [`Self::weigh`] for one record.

@@ -1,6 +1,6 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
-use crate::lanes::{Kernel, LANES, Lanes, Level};
+use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Image, Lattice};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
@@ -9,12 +9,13 @@ use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::{ResolveCell, ResolveJob, SummedSurfaces, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
-use crate::surface_sums::SurfaceSums;
+use crate::surface_sums::{FindLayered, SurfaceSums};
 use rayon::prelude::*;
-use splat_abuffer::{Fragment, Resolve, SampleColor, Thickness};
+use splat_abuffer::{Fragment, Resolve, SampleColor, SplatSurface, Thickness};
+use splat_core::memory::Budget;
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
-use splat_core::render::{Frame, Tiles, quarters};
+use splat_core::render::{Frame, Tiles, Unfinished, pixel_too_large, quarters};
 use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
 use splat_core::shade::SplatShader;
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
@@ -32,6 +33,22 @@ const SET_UP_PARTS: usize = 16;
 
 /// Tiles between two reports of progress, per thread.
 const TILES_A_REPORT: usize = 16;
+
+/// At most so many bytes a sample of a pixel take the buffers of a thread besides the records.
+const WORKER_BYTES: usize = (32 << 10) + PLACES * SurfaceSums::BYTES_PER_CELL / LANES;
+
+/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, what its fragments share, and its image.
+const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>() + size_of::<Option<Image>>());
+
+/// The same for its shader.
+const SHADED_BYTES: usize = 1024;
+
+/// If more of a tile's cells than this hold several layers, sums are not worth their while: such cells are rasterised
+/// twice.
+const MOST_LAYERED: f32 = 0.25;
+
+/// The number of groups of samples up to which the sums of a tile stay in the second cache.
+const MOST_SUMMED: usize = 8;
 
 /// A renderer that keeps its threads and buffers from picture to picture.
 #[derive(Debug)]
@@ -57,6 +74,16 @@ struct Worker {
     fragments: Vec<Fragment>,
     over: Over,
     sums: SurfaceSums,
+    /// The part of the last tile's cells that held several layers.
+    layered_share: f32,
+}
+
+/// Which fragments of a region are kept, and how: [`Target`] without its buffers.
+#[derive(Debug, Clone, Copy)]
+enum Keep {
+    Records,
+    Sums,
+    Layered,
 }
 
 /// A finished tile.
@@ -76,6 +103,10 @@ struct Picture<'a> {
     lattice: Option<Lattice>,
     images: &'a LaneImages,
     level: Level,
+    /// Bytes that the fragments of a tile may take.
+    tile_memory: usize,
+    /// Bytes that those of a pixel may take.
+    pixel_memory: usize,
 }
 
 /// Renders a cloud with a renderer made for it: as [`splat_core::render()`], on all processors.
@@ -131,37 +162,64 @@ impl Renderer {
         options: &RenderOptions,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Rendered, Error> {
+        self.render_from(None, cloud, camera, options, &mut |done, _| progress(done))
+    }
+
+    /// Renders a cloud, from where it was left: the same bits as [`Renderer::render`], if `begun` is a part of the same
+    /// picture, whichever threads made it.
+    ///
+    /// # Errors
+    /// As [`splat_core::render_from()`].
+    pub fn render_from(
+        &mut self,
+        begun: Option<Unfinished>,
+        cloud: &Cloud,
+        camera: &Camera,
+        options: &RenderOptions,
+        watch: &mut dyn FnMut(f64, &Unfinished),
+    ) -> Result<Rendered, Error> {
         let frame = self.frame(cloud, camera, options)?;
         let window = frame.view.window;
+        let mut memory = frame.memory;
         let start = Instant::now();
-        let tiles = Tiles::new(&frame.set_up.splats, &window);
+        let tiles = Tiles::new(&frame.set_up.splats, &window, &mut memory)?;
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture::new(cloud, camera, options, &frame, &self.images, self.level);
-        let mut film = picture.pixels().empty_film(
-            [camera.width, camera.height],
-            window,
-            frame.rasterizer.range().len(),
-        );
-        statistics.samples = (window.area() * frame.rasterizer.range().len()) as u64;
-        film.position_origin = cloud.origin;
+        self.take_lists(&tiles, options, &mut memory)?;
+        let picture = Picture::new(cloud, camera, options, &frame, self, memory);
+        let (size, samples) = ([camera.width, camera.height], frame.rasterizer.range().len());
+        let mut made = match begun {
+            Some(begun) => begun,
+            None => Unfinished {
+                film: picture.pixels().empty_film(size, window, samples)?,
+                tiles: 0,
+                statistics: Statistics::default(),
+            },
+        };
+        made.check(size, window, options.aovs, tiles.len())?;
+        statistics.add_tiles(&made.statistics);
+        statistics.samples = (window.area() * samples) as u64;
+        made.statistics = statistics;
+        made.film.position_origin = cloud.origin;
         let (count, batch) = (tiles.len(), TILES_A_REPORT * self.threads());
-        for first in (0..count).step_by(batch) {
-            progress(first as f64 / count as f64);
+        for first in (made.tiles..count).step_by(batch) {
+            watch(first as f64 / count as f64, &made);
             let finished: Vec<Tile> = self.threads.install(|| {
                 (first..count.min(first + batch))
                     .into_par_iter()
                     .map(|tile| tiles.get(tile))
                     .filter(|(_, ranks)| !ranks.is_empty())
                     .map(|(region, ranks)| self.with_worker(|worker| picture.tile(worker, &region, ranks)))
-                    .collect()
-            });
+                    .collect::<Result<_, Error>>()
+            })?;
             for tile in finished {
-                film.paste(&tile.film);
-                add(&mut statistics, &tile.statistics);
+                made.film.paste(&tile.film);
+                made.statistics.add_tiles(&tile.statistics);
             }
+            made.tiles = count.min(first + batch);
         }
-        progress(1.0);
+        watch(1.0, &made);
         self.set_up = frame.set_up;
+        let Unfinished { film, statistics, .. } = made;
         Ok(Rendered { film, statistics })
     }
 
@@ -177,10 +235,11 @@ impl Renderer {
         options: &RenderOptions,
     ) -> Result<Statistics, Error> {
         let frame = self.frame(cloud, camera, options)?;
+        let mut memory = frame.memory;
         let start = Instant::now();
-        let tiles = Tiles::new(&frame.set_up.splats, &frame.view.window);
+        let tiles = Tiles::new(&frame.set_up.splats, &frame.view.window, &mut memory)?;
         let mut statistics = frame.statistics(start.elapsed());
-        let picture = Picture::new(cloud, camera, options, &frame, &self.images, self.level);
+        let picture = Picture::new(cloud, camera, options, &frame, self, memory);
         let counts: Vec<Statistics> = self.threads.install(|| {
             let tiles = (0..tiles.len()).into_par_iter().map(|tile| tiles.get(tile));
             tiles
@@ -188,11 +247,18 @@ impl Renderer {
                 .map(|(region, ranks)| self.with_worker(|worker| picture.count(worker, &region, ranks)))
                 .collect()
         });
-        for count in &counts {
-            add(&mut statistics, count);
-        }
+        counts.iter().for_each(|count| statistics.add_tiles(count));
         self.set_up = frame.set_up;
         Ok(statistics)
+    }
+
+    /// Sets memory aside for what each thread keeps of the splats of a tile.
+    fn take_lists(&self, tiles: &Tiles, options: &RenderOptions, memory: &mut Budget) -> Result<(), Error> {
+        const HELP: &str = "fewer threads (--threads) or a larger size, of which tiles show less, need less";
+        let longest = (0..tiles.len()).map(|tile| tiles.get(tile).1.len()).max().unwrap_or(0);
+        let shader = if options.material.varies_by_pixel() { SHADED_BYTES } else { 0 };
+        let bytes = longest.saturating_mul(LISTED_BYTES + shader).saturating_mul(self.threads());
+        memory.take("the list of a tile's splats on all threads", bytes, HELP)
     }
 
     /// What is ready before the first fragment; in the memory of the last picture.
@@ -212,14 +278,6 @@ impl Renderer {
         take().push(worker);
         result
     }
-}
-
-/// Adds the statistics of a tile.
-fn add(sum: &mut Statistics, tile: &Statistics) {
-    sum.tests += tile.tests;
-    sum.fragments += tile.fragments;
-    sum.raster += tile.raster;
-    sum.resolve += tile.resolve;
 }
 
 /// [`splat_core::setup::set_up`] in parallel. `all` gives its memory.
@@ -256,14 +314,31 @@ impl<'a> Picture<'a> {
         camera: &'a Camera,
         options: &'a RenderOptions,
         frame: &'a Frame,
-        images: &'a LaneImages,
-        level: Level,
+        renderer: &'a Renderer,
+        memory: Budget,
     ) -> Self {
+        let (images, level) = (&renderer.images, renderer.level);
+        // A splat may need as much as is there, and buffers grow by doubling: they may take four times their use, and once more
+        // while they move.
+        let films = 2 * TILES_A_REPORT * PLACES * options.aovs.bytes_per_pixel();
+        let others = WORKER_BYTES * options.samples as usize + films;
+        let share = (memory.left() / renderer.threads()).saturating_sub(others) / 5;
         let samples = LaneSamples::new(&frame.rasterizer);
         // Of a cell of a lattice every sample lies in another pixel.
         let by_pixel = options.material.varies_by_pixel();
         let lattice = Lattice::new(&frame.rasterizer, &frame.view).filter(|_| !by_pixel);
-        Self { cloud, camera, options, frame, samples, lattice, images, level }
+        Self {
+            cloud,
+            camera,
+            options,
+            frame,
+            samples,
+            lattice,
+            images,
+            level,
+            tile_memory: options.tile_memory.min(share),
+            pixel_memory: if memory.is_limited() { share } else { usize::MAX },
+        }
     }
 
     fn pixels(&self) -> PixelResolver<'_> {
@@ -280,15 +355,15 @@ impl<'a> Picture<'a> {
     }
 
     /// Renders a tile.
-    fn tile(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Tile {
+    fn tile(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Result<Tile, Error> {
         let mut pixels = self.pixels();
         let frame = [self.camera.width, self.camera.height];
-        let mut film = pixels.empty_film(frame, *region, self.samples.samples());
+        let mut film = pixels.empty_film(frame, *region, self.samples.samples())?;
         let start = Instant::now();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let mut statistics = Statistics { raster: start.elapsed(), ..Statistics::default() };
-        self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics);
-        Tile { film, statistics }
+        self.region(worker, region, ranks, &mut pixels, &mut film, &mut statistics)?;
+        Ok(Tile { film, statistics })
     }
 
     /// Makes the fragments of a tile and forgets them.
@@ -298,13 +373,18 @@ impl<'a> Picture<'a> {
         worker.records.forget();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
         let lattice = self.lattice_for(region, ranks, &mut worker.images);
-        let tests = self.rasterize(worker, region, ranks, lattice, Mode::Records);
+        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
         let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 
     /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
-    fn lattice_for(&self, region: &PixelRect, ranks: &[u32], images: &mut Vec<Option<Image>>) -> Option<&Lattice> {
+    fn lattice_for(
+        &self,
+        region: &PixelRect,
+        ranks: &[u32],
+        images: &mut Vec<Option<Image>>,
+    ) -> Option<&Lattice> {
         // A lattice's cells spread over the tile, whatever small part of it is asked for.
         let lattice = self.lattice.as_ref().filter(|_| region.area() >= PLACES / 2)?;
         let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
@@ -322,24 +402,32 @@ impl<'a> Picture<'a> {
         region: &PixelRect,
         ranks: &[u32],
         lattice: Option<&Lattice>,
-        mode: Mode,
+        keep: Keep,
     ) -> u64 {
         let Worker { records, places, distorted, images, cells, sums, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
-        let target = match mode {
-            Mode::Records => Target::Records,
-            Mode::Sums => Target::Sums(sums),
-            Mode::Layered => Target::Layered(sums),
+        let target = match keep {
+            Keep::Records => Target::Records,
+            Keep::Sums => Target::Sums(sums),
+            Keep::Layered => Target::Layered(sums),
         };
         match lattice {
             None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target }),
-            Some(lattice) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, images, region, records, cells, target })
-            }
+            Some(lattice) => self.level.run_single(LatticeJob {
+                frame,
+                lattice,
+                ranks,
+                images,
+                region,
+                records,
+                cells,
+                target,
+            }),
         }
     }
 
-    /// Renders a part of a tile, in quarters if its records exceed the budget.
+    /// Renders a part of a tile, in quarters if its records exceed the budget; a single pixel gets what it needs, if there is as
+    /// much.
     fn region(
         &self,
         worker: &mut Worker,
@@ -348,40 +436,38 @@ impl<'a> Picture<'a> {
         pixels: &mut PixelResolver<'_>,
         film: &mut Film,
         statistics: &mut Statistics,
-    ) {
+    ) -> Result<(), Error> {
         let start = Instant::now();
-        let limit = self.options.tile_memory / RecordBuffer::BYTES_PER_RECORD;
-        let limit = if region.area() > 1 { limit } else { usize::MAX };
-        let lattice = self.lattice_for(region, ranks, &mut worker.images);
-        let groups = self.samples.groups();
-        let summed = self.sums_surfaces() && SUMS.load(std::sync::atomic::Ordering::Relaxed);
-        let (tests, fragments);
-        if summed {
-            worker.records.clear(groups, false, usize::MAX);
-            worker.records.forget();
-            worker.sums.prepare(groups);
-            tests = self.rasterize(worker, region, ranks, lattice, Mode::Sums);
-            fragments = worker.records.fragments;
-            self.level.run_single(FindLayered(&mut worker.sums, lattice.is_none()));
-            LAYERED.fetch_add(worker.sums.layered_count as u64, std::sync::atomic::Ordering::Relaxed);
-            CELLS.fetch_add((groups*1024) as u64, std::sync::atomic::Ordering::Relaxed);
-            TILES.fetch_add((worker.sums.layered_count>0) as u64, std::sync::atomic::Ordering::Relaxed);
-            worker.records.clear(groups, false, limit);
-            if worker.sums.layered_count > 0 {
-                self.rasterize(worker, region, ranks, lattice, Mode::Layered);
-            }
-        } else {
-            worker.records.clear(groups, self.two_sided(), limit);
-            tests = self.rasterize(worker, region, ranks, lattice, Mode::Records);
-            fragments = worker.records.fragments;
+        let limit = if region.area() > 1 { self.tile_memory } else { self.pixel_memory };
+        let limit = limit / RecordBuffer::BYTES_PER_RECORD;
+        // One splat may hit all cells of a region, on both sides.
+        if region.area() > 1
+            && self.pixel_memory < usize::MAX
+            && 2 * region.area() * self.samples.groups() > limit
+        {
+            return quarters(region)
+                .try_for_each(|quarter| self.region(worker, &quarter, ranks, pixels, film, statistics));
         }
+        let lattice = self.lattice_for(region, ranks, &mut worker.images);
+        let summed = self.can_sum() && worker.layered_share < MOST_LAYERED;
+        let (tests, fragments) = if summed {
+            self.sum_surfaces(worker, region, ranks, lattice, limit)
+        } else {
+            // So that sums are tried again in a while.
+            worker.layered_share *= 0.9;
+            worker.records.clear(self.samples.groups(), self.two_sided(), limit);
+            let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
+            (tests, worker.records.fragments)
+        };
         if !worker.records.is_complete() {
             worker.sums.clear();
             statistics.raster += start.elapsed();
-            for quarter in quarters(region) {
-                self.region(worker, &quarter, ranks, pixels, film, statistics);
+            if region.area() == 1 {
+                let bytes = RecordBuffer::BYTES_PER_RECORD;
+                return Err(pixel_too_large(limit + 1, bytes, self.pixel_memory));
             }
-            return;
+            return quarters(region)
+                .try_for_each(|quarter| self.region(worker, &quarter, ranks, pixels, film, statistics));
         }
         worker.records.group();
         statistics.raster += start.elapsed();
@@ -424,16 +510,43 @@ impl<'a> Picture<'a> {
             _ => self.resolve_each(worker, region, lattice, pixels, film),
         }
         statistics.resolve += start.elapsed();
+        Ok(())
     }
 
-    fn sums_surfaces(&self) -> bool {
-        let surfaces =
-            matches!(self.options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. });
-        surfaces
+    /// Makes the fragments of a region: sums where a cell holds one layer, and records for the others. Returns the
+    /// number of samples tested and that of fragments.
+    fn sum_surfaces(
+        &self,
+        worker: &mut Worker,
+        region: &PixelRect,
+        ranks: &[u32],
+        lattice: Option<&Lattice>,
+        limit: usize,
+    ) -> (u64, u64) {
+        let groups = self.samples.groups();
+        worker.sums.prepare(groups);
+        worker.records.clear(groups, false, usize::MAX);
+        worker.records.forget();
+        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Sums);
+        let fragments = worker.records.fragments;
+        let [layered, hit] =
+            self.level.run_single(FindLayered { sums: &mut worker.sums, by_pixel: lattice.is_none() });
+        worker.layered_share = layered as f32 / hit.max(1) as f32;
+        worker.records.clear(groups, false, limit);
+        if layered > 0 {
+            self.rasterize(worker, region, ranks, lattice, Keep::Layered);
+        }
+        (tests, fragments)
+    }
+
+    /// Whether the surfaces of a cell may be known by sums alone.
+    fn can_sum(&self) -> bool {
+        matches!(self.options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. })
             && few(self.options.aovs)
             && self.cloud.opacities.is_none()
-            && !self.two_sided()
             && !self.options.material.varies_by_pixel()
+            && !self.two_sided()
+            && self.samples.groups() <= MOST_SUMMED
     }
 
     /// Whether both sides of a splat can be seen, and are not the same to the resolve.
@@ -517,29 +630,6 @@ impl<'a> Picture<'a> {
             }
         }
     }
-}
-
-struct FindLayered<'a>(&'a mut SurfaceSums, bool);
-impl Kernel for FindLayered<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        self.0.find_layered::<L>(self.1);
-    }
-}
-/// experiment
-pub static SUMS: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(true);
-/// experiment
-pub static LAYERED: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
-/// experiment
-pub static CELLS: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
-/// experiment
-pub static TILES: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
-#[derive(Clone, Copy)]
-enum Mode {
-    Records,
-    Sums,
-    Layered,
 }
 
 /// Whether the AOVs need no more of a sample than its colour, transmittance and coverage.

@@ -92,7 +92,7 @@ impl<C: ResolveCell> ResolveJob<'_, '_, '_, C> {
         let count = self.samples.samples();
         self.scratch.clear();
         self.scratch.resize(PLACES * count, SampleColor::NOTHING);
-        for cell in (0..lattice.cells()){
+        for cell in 0..lattice.cells() {
             if self.cells.is_empty(self.buffer, cell) {
                 continue;
             }

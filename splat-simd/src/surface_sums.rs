@@ -1,17 +1,17 @@
 //! Surfaces summed as they are rasterised, without storing fragments.
 //!
-//! Nearly all cells of a smooth surface hold one layer: in each lane the intervals of all fragments have a point in common. Its
-//! sums run in splat order, and so do the splats that are rasterised; so they can be made at once, with the bits that the
-//! fragments would give later. Whether a cell really held one layer is known at the end. The few that did not are
-//! rasterised again, into records.
+//! Where one side of the splats is seen, nearly all cells of a smooth surface hold one layer: in each lane the intervals of all
+//! fragments have a point in common. The layer's sums run in splat order, and in that order splats are rasterised; so the sums
+//! can be made at once, with the bits that stored fragments would give later. Whether a cell really held one layer is known at
+//! the end. The few that did not are rasterised again, into records.
 
-use crate::lanes::{Eight, LANES, Lanes};
+use crate::lanes::{Eight, Kernel, LANES, Lanes};
 use crate::places::PLACES;
 use crate::records::cell_of;
 use crate::resolve::{Sums, interval};
 use splat_abuffer::SplatSurface;
 
-/// What is known of the fragments of a cell, if they are opaque.
+/// What is known of the opaque fragments of a cell.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 struct CellSums {
@@ -37,25 +37,30 @@ impl CellSums {
 pub struct SurfaceSums {
     /// Between two tiles all of them are empty.
     cells: Vec<CellSums>,
-    /// Cells of several layers.
+    /// Cells that hold several layers.
     layered: Vec<bool>,
-    /// Number of these.
-    pub layered_count: usize,
 }
 
 impl SurfaceSums {
+    /// Bytes of a cell with all that belongs to it.
+    pub const BYTES_PER_CELL: usize = size_of::<CellSums>() + size_of::<bool>();
+
     /// Makes room for a tile of `groups` times [`PLACES`] cells.
     pub fn prepare(&mut self, groups: usize) {
         self.cells.resize(groups * PLACES, CellSums::EMPTY);
         self.layered.clear();
         self.layered.resize(groups * PLACES, false);
-        self.layered_count = 0;
     }
 
     /// Adds the fragments of a splat in a cell, or in two different ones.
     #[inline(always)]
-    pub fn add<L: Lanes>(&mut self, cells: [usize; 2], depth: L, weight: L, surface: &SplatSurface) {
-        let [first, second] = cells;
+    pub fn add<L: Lanes>(
+        &mut self,
+        [first, second]: [usize; 2],
+        depth: L,
+        weight: L,
+        surface: &SplatSurface,
+    ) {
         let (a, b) = (&self.cells[first], &self.cells[second]);
         let [near, far] = interval(depth, surface);
         let last_near = near.greatest(L::load_cells(&a.last_near, &b.last_near));
@@ -63,50 +68,24 @@ impl SurfaceSums {
         let color = |i: usize| L::load_cells(&a.weight_color[i], &b.weight_color[i]);
         let mut sums = Sums::opaque(L::load_cells(&a.weight, &b.weight), [color(0), color(1), color(2)]);
         sums.add::<true>(weight, surface);
-        self.store::<L, 0>(first, last_near, first_far, &sums);
+        self.store::<L, 0>(first, [last_near, first_far], &sums);
         if L::CELLS == 2 && first != second {
-            self.store::<L, 1>(second, last_near, first_far, &sums);
+            self.store::<L, 1>(second, [last_near, first_far], &sums);
         }
     }
 
     #[inline(always)]
-    fn store<L: Lanes, const CELL: usize>(&mut self, cell: usize, last_near: L, first_far: L, sums: &Sums<L>) {
+    fn store<L: Lanes, const CELL: usize>(&mut self, cell: usize, [near, far]: [L; 2], sums: &Sums<L>) {
         let to = &mut self.cells[cell];
-        last_near.store_cell::<CELL>(&mut to.last_near);
-        first_far.store_cell::<CELL>(&mut to.first_far);
+        near.store_cell::<CELL>(&mut to.last_near);
+        far.store_cell::<CELL>(&mut to.first_far);
         sums.weight.store_cell::<CELL>(&mut to.weight);
         for (to, color) in to.weight_color.iter_mut().zip(sums.weight_opacity_color) {
             color.store_cell::<CELL>(to);
         }
     }
 
-    /// Finds the cells of several layers and empties them. If `by_pixel`, all groups of a pixel are rasterised again together.
-    #[inline(always)]
-    pub fn find_layered<L: Lanes>(&mut self, by_pixel: bool) {
-        for (cell, sums) in self.cells.iter().enumerate() {
-            let [near, far] = [L::load(&sums.last_near), L::load(&sums.first_far)];
-            let layered = near.not_less_or_equal(far).bits() != 0;
-            self.layered[cell] |= layered;
-            self.layered_count += usize::from(layered);
-        }
-        if self.layered_count == 0 {
-            return;
-        }
-        if by_pixel {
-            let groups = self.layered.len() / PLACES;
-            for place in 0..PLACES {
-                let cells = (0..groups).map(|group| cell_of(place as u16, group));
-                if cells.clone().any(|cell| self.layered[cell]) {
-                    cells.for_each(|cell| self.layered[cell] = true);
-                }
-            }
-        }
-        for (sums, _) in self.cells.iter_mut().zip(&self.layered).filter(|(_, layered)| **layered) {
-            *sums = CellSums::EMPTY;
-        }
-    }
-
-    /// Whether a cell (of a pixel, if those were asked for: its place) holds several layers.
+    /// Whether a cell holds several layers. The cells of a pixel do so together.
     #[inline(always)]
     pub fn is_layered(&self, cell: usize) -> bool {
         self.layered[cell]
@@ -129,5 +108,44 @@ impl SurfaceSums {
     /// Empties all cells.
     pub fn clear(&mut self) {
         self.cells.fill(CellSums::EMPTY);
+    }
+}
+
+/// Finds the cells that hold several layers, and empties them. Gives their number, and that of the cells that were hit.
+#[derive(Debug)]
+pub struct FindLayered<'a> {
+    /// The sums of a tile.
+    pub sums: &'a mut SurfaceSums,
+    /// Whether cells are groups of samples of a pixel: then all of a pixel are found together.
+    pub by_pixel: bool,
+}
+
+impl Kernel for FindLayered<'_> {
+    type Output = [usize; 2];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [usize; 2] {
+        let SurfaceSums { cells, layered } = self.sums;
+        let (mut hit, mut found) = (0, false);
+        for (sums, layered) in cells.iter().zip(&mut *layered) {
+            let [near, far] = [L::load(&sums.last_near), L::load(&sums.first_far)];
+            *layered = near.not_less_or_equal(far).bits() != 0;
+            found |= *layered;
+            hit += usize::from(sums.first_far != [f32::INFINITY; LANES]);
+        }
+        if !found {
+            return [0, hit];
+        }
+        if self.by_pixel {
+            let groups = layered.len() / PLACES;
+            for place in 0..PLACES as u16 {
+                let any = (0..groups).any(|group| layered[cell_of(place, group)]);
+                (0..groups).for_each(|group| layered[cell_of(place, group)] = any);
+            }
+        }
+        for (sums, _) in cells.iter_mut().zip(&*layered).filter(|(_, layered)| **layered) {
+            *sums = CellSums::EMPTY;
+        }
+        [layered.iter().filter(|layered| **layered).count(), hit]
     }
 }

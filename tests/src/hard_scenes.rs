@@ -1,7 +1,7 @@
 //! Scenes that are meant to be hard for a renderer: splats of every [`Kind`] before any camera ([`adversarial`]), and
 //! surfaces in many layers ([`sheets`]).
 
-use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, EulerRot, Vec3};
+use glam::{DMat4, DQuat, DVec2, DVec3, Vec3};
 use splat_core::{Camera, Cloud, Shapes};
 
 use crate::random::Random;
@@ -99,9 +99,12 @@ impl Maker<'_> {
 
     /// Round axes of this size in any direction.
     fn axes(&mut self, size: f64) -> [DVec3; 2] {
-        let mut angle = || self.random.range(0.0, std::f64::consts::TAU);
-        let frame = DMat3::from_euler(EulerRot::XYZ, angle(), angle(), angle());
-        [frame.x_axis * size, frame.y_axis * size]
+        // By Euler's angles about x, y and z; by `libm`, so that scenes are the same on every machine.
+        let [(sa, ca), (sb, cb), (sc, cc)] =
+            [0; 3].map(|_| libm::sincos(self.random.range(0.0, std::f64::consts::TAU)));
+        let first = DVec3::new(cb * cc, sa * sb * cc + ca * sc, sa * sc - ca * sb * cc);
+        let second = DVec3::new(-cb * sc, ca * cc - sa * sb * sc, ca * sb * sc + sa * cc);
+        [first * size, second * size]
     }
 
     /// Axes of this size, the first of which is all but along a direction: as far off as `angle`.

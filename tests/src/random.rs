@@ -34,6 +34,13 @@ impl Random {
         (self.unit() * n as f64) as usize
     }
 
+    /// Puts things in a random order.
+    pub fn shuffle<T>(&mut self, things: &mut [T]) {
+        for last in (1..things.len()).rev() {
+            things.swap(last, self.index(last + 1));
+        }
+    }
+
     /// Uniform in the unit disc.
     pub fn in_disc(&mut self) -> DVec2 {
         loop {

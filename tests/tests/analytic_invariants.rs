@@ -1,11 +1,9 @@
-//! Pictures that must be the same by other means: crops, sample ranges, memory, orders, bad points, shifts.
+//! Pictures that must be the same by other means: sample ranges, memory, splats with defects. See `metamorphic` for others.
 
-use glam::{DMat4, DQuat, DVec3, Vec3};
-use splat_core::film::NO_ID;
-use splat_core::{AovSelection, Camera, Cloud, Lens, PixelRect, RenderOptions, Shapes, srgb};
-use splat_tests::analytic::{alphas, assert_same_bits, film_bits, picture, pixels, rendered};
-use splat_tests::random::Random;
-use splat_tests::scenes::{self, Surfel, cloud, hard_discs, orthographic, permuted, pinhole, with_lens};
+use glam::{DVec3, Vec3};
+use splat_core::{AovSelection, Cloud, RenderOptions, Shapes, srgb};
+use splat_tests::analytic::{alphas, assert_same_bits, picture, rendered};
+use splat_tests::scenes::{self, Surfel, cloud, hard_discs, permuted, pinhole};
 use splat_tests::tolerances as tol;
 
 /// The golden scenes with all AOVs.
@@ -18,32 +16,6 @@ fn all_scenes() -> Vec<scenes::Scene> {
 /// Two units in the last place of a number.
 fn two_ulps(value: f32) -> f32 {
     2.0 * (value.abs().next_up() - value.abs())
-}
-
-#[test]
-fn a_crop_is_a_window_of_the_whole() {
-    for scene in all_scenes() {
-        let whole = picture(&scene.cloud, &scene.camera, &scene.options);
-        let bits = film_bits(&whole);
-        for window in [
-            PixelRect::new(0, 0, 64, 48),
-            PixelRect::new(13, 7, 51, 40),
-            PixelRect::new(31, 31, 33, 33),
-            PixelRect::new(40, 20, 41, 21),
-            PixelRect::new(-5, 44, 9, 99),
-        ] {
-            let options = RenderOptions { window: Some(window), ..scene.options.clone() };
-            let crop = picture(&scene.cloud, &scene.camera, &options);
-            assert_eq!(crop.window, window.intersect(&PixelRect::new(0, 0, 64, 48)));
-            assert_eq!(crop.frame, [64, 48]);
-            let crop_bits = film_bits(&crop);
-            assert_eq!(crop_bits.len(), crop.window.area());
-            for (x, y) in pixels(&crop) {
-                let [part, all] = [&crop_bits[crop.index(x, y)], &bits[whole.index(x, y)]];
-                assert_eq!(part, all, "{}: ({x}, {y}) of {window:?}", scene.name);
-            }
-        }
-    }
 }
 
 #[test]
@@ -109,60 +81,10 @@ fn a_tiny_budget_of_memory_changes_no_bit() {
     }
 }
 
-/// A random order of `count` things.
-fn shuffled(count: usize, seed: u64) -> Vec<usize> {
-    let mut random = Random::new(seed);
-    let mut order: Vec<usize> = (0..count).collect();
-    for last in (1..count).rev() {
-        order.swap(last, random.index(last + 1));
-    }
-    order
-}
-
-#[test]
-fn the_order_of_points_changes_no_bit() {
-    for scene in all_scenes() {
-        // Four splats that differ in colour alone: enough for the order of sums to tell.
-        let order: Vec<usize> = (0..scene.cloud.len()).map(|i| if i < 4 { 0 } else { i }).collect();
-        let mut cloud = permuted(&scene.cloud, &order);
-        for (i, color) in cloud.colors.iter_mut().flatten().take(4).enumerate() {
-            *color *= 0.7 + 0.11 * i as f32;
-        }
-        let film = picture(&cloud, &scene.camera, &scene.options);
-        for seed in 0..3 {
-            let order = shuffled(cloud.len(), seed);
-            let mut other = picture(&permuted(&cloud, &order), &scene.camera, &scene.options);
-            // The id is the place in the file: new point i was `order[i]`.
-            for id in other.id.iter_mut().flatten().filter(|id| **id != NO_ID) {
-                *id = order[*id as usize] as u32;
-            }
-            assert_same_bits(scene.name, &film, &other);
-        }
-    }
-}
-
 /// The cloud with one more point in front of all others, like the first one.
 fn with_one_more(cloud: &Cloud) -> Cloud {
     let order: Vec<usize> = std::iter::once(0).chain(0..cloud.len()).collect();
     permuted(cloud, &order)
-}
-
-#[test]
-fn a_bad_point_changes_nothing_but_the_count() {
-    for scene in all_scenes() {
-        let good = rendered(&scene.cloud, &scene.camera, &scene.options);
-        assert!(good.statistics.dropped.is_empty(), "{}", scene.name);
-        let mut bad = with_one_more(&scene.cloud);
-        bad.positions[0].y = f32::NAN;
-        let mut found = rendered(&bad, &scene.camera, &scene.options);
-        assert_eq!(found.statistics.dropped.get("not_finite"), Some(&1), "{}", scene.name);
-        assert_eq!(found.statistics.dropped.len(), 1);
-        assert_eq!(found.statistics.drawn, good.statistics.drawn);
-        for id in found.film.id.iter_mut().flatten().filter(|id| **id != NO_ID) {
-            *id -= 1;
-        }
-        assert_same_bits(scene.name, &good.film, &found.film);
-    }
 }
 
 #[test]
@@ -222,52 +144,5 @@ fn every_defect_is_counted_by_its_cause() {
         let none = Cloud { areas: Some(vec![area]), ..good.clone() };
         let film = picture(&none, &camera, &RenderOptions::default());
         assert!(film.rgba.iter().all(|&pixel| pixel == [0.0; 4]), "{area}");
-    }
-}
-
-#[test]
-fn a_shifted_world_is_the_same_picture() {
-    let (width, height) = (160, 120);
-    let mut random = Random::new(31);
-    let directions = scenes::fibonacci_sphere(3000);
-    let mut surfels: Vec<Surfel> = directions
-        .iter()
-        .map(|&direction| {
-            let color = [0; 3].map(|_| random.unit() as f32);
-            Surfel::new(DVec3::new(0.1, 0.0, 3.0) + 0.8 * direction, direction, 0.035).colored(color)
-        })
-        .collect();
-    surfels.extend((0..30).map(|_| {
-        let place = DVec3::new(random.range(-1.5, 1.5), random.range(-1.2, 1.2), random.range(1.5, 5.0));
-        let color = [0; 3].map(|_| random.unit() as f32);
-        Surfel::new(place, random.direction(), random.range(0.02, 0.2)).colored(color).with_opacity(0.5)
-    }));
-    let turn = DMat4::from_rotation_translation(DQuat::from_rotation_z(0.5), DVec3::new(0.0, 0.1, 0.2));
-    let lens = Lens { radius: 0.03, focus: 2.5, blades: 0 };
-    for camera in [
-        pinhole(width, height, 130.0),
-        with_lens(pinhole(width, height, 130.0), lens),
-        orthographic(width, height, 50.0),
-    ] {
-        let picture_at = |shift: DVec3| {
-            let shifted: Vec<Surfel> =
-                surfels.iter().map(|s| Surfel { position: s.position + shift, ..*s }).collect();
-            let camera = Camera { world_to_camera: turn * DMat4::from_translation(-shift), ..camera.clone() };
-            let options = RenderOptions { samples: 4, ..RenderOptions::default() };
-            picture(&cloud(&shifted), &camera, &options)
-        };
-        let here = picture_at(DVec3::ZERO);
-        let there = picture_at(DVec3::new(500_000.0, 5_000_000.0, 100.0));
-        let shown = |pixel: [f32; 4]| {
-            let [red, green, blue, alpha] = pixel.map(f64::from);
-            [srgb::encode(red), srgb::encode(green), srgb::encode(blue), alpha]
-        };
-        let differing = here.rgba.iter().zip(&there.rgba).filter(|&(&a, &b)| {
-            let pairs = shown(a).into_iter().zip(shown(b));
-            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) > 2.0 / 255.0
-        });
-        let part = differing.count() as f64 / here.rgba.len() as f64;
-        assert!(part <= tol::SHIFTED_PIXELS, "{part}");
-        assert!(alphas(&here).sum::<f64>() > 0.2 * here.rgba.len() as f64, "an empty picture says nothing");
     }
 }

@@ -5,7 +5,6 @@
 
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
-use proptest::test_runner::{RngSeed, TestRunner};
 use splat_abuffer::{Coverage, Fragment, MIN_LAYER_WEIGHT, Resolve, Thickness};
 use splat_core::raster::{Form, SamplePlace};
 use splat_core::render::Frame;
@@ -15,6 +14,7 @@ use splat_core::{
     RenderOptions, Shapes, TableMode,
 };
 use splat_simd::{Level, Method, Renderer};
+use splat_tests::cases::{check, factor};
 use splat_tests::hard_scenes::{Facing, Kind, Knowledge, Sheets, adversarial, moved, sheets};
 use splat_tests::random::Random;
 use splat_tests::scenes::{OPAQUE, Scene, golden, jumble, orthographic, pinhole, soft, sphere, with_lens};
@@ -22,33 +22,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 // ---------------------------------------------------------------------------------------------------------
-// Running
-
-/// How many times as many cases are tried.
-fn factor() -> u32 {
-    let given = std::env::var("SPLAT_CASES").ok();
-    given.map_or(1, |text| text.parse().expect("SPLAT_CASES is a whole number"))
-}
-
-/// Runs a property over a strategy: the same cases in every run.
-fn check<S: Strategy>(cases: u32, seed: u64, strategy: S, test: impl Fn(S::Value))
-where
-    S::Value: std::fmt::Debug,
-{
-    let config = ProptestConfig {
-        cases: cases * factor(),
-        rng_seed: RngSeed::Fixed(seed),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    };
-    let run = TestRunner::new(config).run(&strategy, |case| {
-        test(case);
-        Ok(())
-    });
-    if let Err(error) = run {
-        panic!("{error}");
-    }
-}
+// Tallies
 
 /// What was compared: numbers of splat-pixel pairs, of fragments, and of fragments of each sort.
 #[derive(Debug, Default)]
@@ -683,13 +657,16 @@ fn layered() -> impl Strategy<Value = (Sheets, f64, u64)> {
 fn sheets_agree() {
     let layers = RefCell::new(BTreeMap::<usize, usize>::new());
     let coverage = prop_oneof![Just(OPAQUE), Just(soft(1.0)), Just(soft(0.5)), Just(soft(8.0))];
-    let case = (layered(), coverage, aovs(), 1u32..18, any::<bool>());
-    check(48, 3, case, |((made, thickness, seed), resolve, aovs, samples, lens)| {
-        let cloud = sheets(&made, seed);
+    // Both sides of splats, or one: surfaces of one side are summed without being stored, where they are smooth.
+    let sides = prop_oneof![Just((true, false)), Just((true, true)), Just((false, false))];
+    let case = (layered(), coverage, aovs(), 1u32..18, any::<bool>(), sides);
+    check(72, 3, case, |((made, thickness, seed), resolve, aovs, samples, lens, (oriented, cull))| {
+        let mut cloud = sheets(&made, seed);
+        cloud.oriented &= oriented;
         let camera = pinhole(40, 36, 60.0);
         let lens_of = Lens { radius: 0.4, focus: 4.5, blades: 0 };
         let camera = if lens { with_lens(camera, lens_of) } else { camera };
-        let options = RenderOptions { samples, resolve, thickness, aovs, ..RenderOptions::default() };
+        let options = RenderOptions { samples, resolve, thickness, aovs, cull, ..RenderOptions::default() };
         check_pictures(&cloud, &camera, &options, &[2], &TILE_MEMORY[seed as usize % 3..][..1]);
         // That there was something to tell apart.
         let aovs = AovSelection { layers: true, ..AovSelection::default() };

@@ -1,7 +1,7 @@
 //! What is said of a cloud.
 
-use crate::describe;
 use crate::values::Columns;
+use crate::{describe, strict};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 use splat_core::prepare::unknown_sizes;
@@ -42,6 +42,8 @@ pub struct Summary {
     sizes: Sizes,
     fields: Vec<FieldSummary>,
     assumptions: Vec<String>,
+    /// What else is out of order in the file, and passed over or changed.
+    losses: Vec<String>,
 }
 
 /// What is said of a scalar field.
@@ -95,10 +97,14 @@ impl Summary {
     /// Reads a cloud and sums it up.
     ///
     /// # Errors
-    /// What the reader says.
-    pub fn read(path: &Path, columns: Option<&Columns>) -> Result<Self, splat_io::Error> {
+    /// What the reader says; with `strict`, everything that is out of order.
+    pub fn read(path: &Path, columns: Option<&Columns>, strict: bool) -> anyhow::Result<Self> {
         let options = CloudOptions { columns: columns.map(|columns| columns.0.clone()) };
-        let Import { cloud, report } = read_cloud(path, &options)?;
+        let mut import = read_cloud(path, &options)?;
+        if strict {
+            strict::check_import(&mut import)?;
+        }
+        let Import { cloud, report } = import;
         Ok(Self::new(cloud, report))
     }
 
@@ -142,6 +148,7 @@ impl Summary {
             fields: cloud.fields.iter().map(FieldSummary::new).collect(),
             dropped: dropped(&mut cloud),
             assumptions,
+            losses: report.losses.iter().map(ToString::to_string).collect(),
         }
     }
 }
@@ -276,6 +283,9 @@ impl fmt::Display for Summary {
         for assumption in &self.assumptions {
             writeln!(f, "  - {assumption}")?;
         }
+        for (number, loss) in self.losses.iter().enumerate() {
+            writeln!(f, "{}  - {loss}", if number == 0 { "out of order\n" } else { "" })?;
+        }
         Ok(())
     }
 }
@@ -292,6 +302,7 @@ mod tests {
             sha256: String::new(),
             elements: Vec::new(),
             assumptions: Vec::new(),
+            losses: Vec::new(),
         };
         Summary::new(cloud, report)
     }

@@ -1,5 +1,6 @@
 //! What is said of a mesh.
 
+use crate::strict;
 use serde::Serialize;
 use splat_io::{MeshImport, read_obj};
 use std::fmt;
@@ -26,16 +27,22 @@ pub struct Summary {
     /// Triangles with normals at their corners.
     with_normals: usize,
     assumptions: Vec<String>,
+    /// What is out of order in the file, and passed over.
+    losses: Vec<String>,
 }
 
 impl Summary {
     /// Reads a mesh and sums it up.
     ///
     /// # Errors
-    /// What the reader says.
-    pub fn read(path: &Path) -> Result<Self, splat_io::Error> {
-        let MeshImport { mesh, report } = read_obj(path)?;
+    /// What the reader says; with `strict`, everything that is out of order.
+    pub fn read(path: &Path, strict: bool) -> anyhow::Result<Self> {
+        let MeshImport { mesh, mut report } = read_obj(path)?;
         let (area, degenerate) = mesh.area();
+        report.losses.extend(strict::without_area(&mesh, degenerate));
+        if strict {
+            strict::check(&report, &report.losses)?;
+        }
         let finite = mesh.positions.iter().filter(|position| position.is_finite());
         let corners = finite.map(|&p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)));
         let with = |triples: &[[u32; 3]]| {
@@ -55,6 +62,7 @@ impl Summary {
             textured: with(&mesh.texture_triangles),
             with_normals: with(&mesh.normal_triangles),
             assumptions: report.assumptions,
+            losses: report.losses.iter().map(ToString::to_string).collect(),
         })
     }
 }
@@ -78,6 +86,10 @@ impl fmt::Display for Summary {
         for assumption in &self.assumptions {
             writeln!(f, "  - {assumption}")?;
         }
-        writeln!(f, "  - rendered as it is, the surface is sampled: splat convert has the options")
+        writeln!(f, "  - rendered as it is, the surface is sampled: splat convert has the options")?;
+        for (number, loss) in self.losses.iter().enumerate() {
+            writeln!(f, "{}  - {loss}", if number == 0 { "out of order\n" } else { "" })?;
+        }
+        Ok(())
     }
 }

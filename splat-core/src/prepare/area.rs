@@ -1,14 +1,18 @@
 //! The area that each splat stands for: SPEC section 4.
 
 use super::PrepareOptions;
-use super::neighbors::Neighbors;
+use super::neighbors::{BLOCK, Neighbors};
 use crate::setup::{InverseShape, splat_area};
 use crate::{Cloud, Shapes};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Binary digits of the fixed-point sums, relative to the largest possible term: integers add up to the same sum in
 /// any order, and 2^40 splats of the largest weight fit.
 const FRACTION: f64 = (1u128 << 80) as f64;
+
+/// Terms that are kept at once, 32 bytes each.
+const MOST_TERMS: usize = 1 << 21;
 
 /// area_i = 1 / sum_j s_ij k_j(p_i) / (|T1 x T2|_j I): the weights at each splat's centre then sum to about 1,
 /// whatever the density. 0 where a splat has a defect.
@@ -31,8 +35,8 @@ pub fn estimate(
     let inverse_area = |index: usize| 1.0 / (splat_area(cloud, index) * integral);
     let largest = (0..cloud.len()).filter(|&index| fit[index]).map(inverse_area).fold(0.0, f64::max);
 
-    // What the splats of a place add to the sums of others.
-    let terms = |place: usize| -> Vec<(usize, u128)> {
+    // What the splats of a place add to the sums of others; nothing once there are too many of several places.
+    let terms = |place: usize, room: Option<&AtomicUsize>| -> Option<Vec<(usize, u128)>> {
         let mut terms = Vec::new();
         for j in neighbors.members(place).filter(|&j| fit[j]) {
             let shape = InverseShape::new(cloud, j);
@@ -41,16 +45,31 @@ pub fn estimate(
                 let r2 = shape.r2(neighbors.place(near) - neighbors.place(place));
                 let value = options.kernel.value(r2, options.cutoff);
                 let term = |i| (i, (value * same_side(cloud, i, j) * scale) as u128);
+                let before = terms.len();
                 terms.extend(neighbors.members(near).filter(|&i| fit[i]).map(term));
+                let count = terms.len() - before;
+                if room.is_some_and(|room| room.fetch_add(count, Ordering::Relaxed) > MOST_TERMS) {
+                    return None;
+                }
             }
         }
-        terms
+        Some(terms)
     };
     let mut sums = vec![0u128; cloud.len()];
-    for block in neighbors.blocks() {
-        let found: Vec<Vec<(usize, u128)>> = block.clone().into_par_iter().map(terms).collect();
+    let (mut start, mut places) = (0, BLOCK);
+    while start < neighbors.len() {
+        let end = neighbors.len().min(start + places);
+        let (room, is_block) = (AtomicUsize::new(0), places > 1);
+        let room = is_block.then_some(&room);
+        let found: Option<Vec<_>> = (start..end).into_par_iter().map(|place| terms(place, room)).collect();
+        // Splats much larger than their spacing reach very many places: then fewer at once.
+        let Some(found) = found else {
+            places = places.div_ceil(2);
+            continue;
+        };
         found.into_iter().flatten().for_each(|(index, term)| sums[index] += term);
-        progress(block.end as f64 / neighbors.len() as f64);
+        (start, places) = (end, BLOCK.min(2 * places));
+        progress(end as f64 / neighbors.len() as f64);
     }
     let area = |sum: u128| if sum == 0 { 0.0 } else { (FRACTION / largest / sum as f64) as f32 };
     sums.into_iter().map(area).collect()

@@ -68,6 +68,16 @@ impl PrepareOptions {
     }
 }
 
+impl PrepareOptions {
+    /// Whether [`prepare`] has nothing to estimate of a cloud, nor to look for.
+    pub fn would_keep(&self, cloud: &Cloud) -> bool {
+        let known_areas = !self.areas || self.kernel == Kernel::Disc || cloud.areas.is_some();
+        let known_sides = self.orientation == Orientation::TwoSided || cloud.oriented;
+        let known = !cloud.normals.is_empty() && known_sides && unknown_sizes(cloud) == 0 && known_areas;
+        known && self.outliers == Outliers::Keep
+    }
+}
+
 /// What was estimated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Estimated {

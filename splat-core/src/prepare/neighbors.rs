@@ -24,7 +24,7 @@ pub struct Neighbors {
 }
 
 /// Places done in parallel between two reports of progress.
-const BLOCK: usize = 1 << 14;
+pub const BLOCK: usize = 1 << 14;
 
 impl Neighbors {
     /// Sorts a cloud's finite points, outliers left out, into a tree.

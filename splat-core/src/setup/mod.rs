@@ -106,6 +106,9 @@ pub struct SetUp {
 /// Numbers of splats, by the cause of dropping them.
 pub type Dropped = BTreeMap<&'static str, usize>;
 
+/// Splats that are set up together.
+const AT_ONCE: usize = 1024;
+
 /// The cause of dropping a splat whose projection has no area that `f32` could tell.
 const EDGE_ON: &str = "edge_on";
 
@@ -125,11 +128,15 @@ impl SetUp {
 
     /// Sets up the next splats, given their indices in splat order.
     pub fn extend(&mut self, cloud: &Cloud, view: &View, options: &RenderOptions, order: &[u32]) {
-        // First all splats in camera space: so the loops are short, and the processor works on several splats at once.
-        let splats: Vec<_> = order.iter().map(|&index| camera_splat(cloud, index as usize, view)).collect();
-        for (&index, splat) in order.iter().zip(&splats) {
-            if let Outcome::EdgeOn = self.push(cloud, index as usize, splat, view, options) {
-                count_dropped(&mut self.dropped, EDGE_ON, 1);
+        let mut splats = Vec::with_capacity(order.len().min(AT_ONCE));
+        for order in order.chunks(AT_ONCE) {
+            // First all in camera space: so the loops are short, and the processor works on several splats at once.
+            splats.clear();
+            splats.extend(order.iter().map(|&index| camera_splat(cloud, index as usize, view)));
+            for (&index, splat) in order.iter().zip(&splats) {
+                if let Outcome::EdgeOn = self.push(cloud, index as usize, splat, view, options) {
+                    count_dropped(&mut self.dropped, EDGE_ON, 1);
+                }
             }
         }
     }

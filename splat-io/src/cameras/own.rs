@@ -306,6 +306,11 @@ fn json(path: &Path, name: Option<String>, camera: &Camera) -> Result<CameraJson
     })
 }
 
+/// A camera as one line of JSON, as [`write_camera_json`] writes it; none if the format cannot hold it.
+pub fn camera_json(camera: &Camera) -> Option<String> {
+    serde_json::to_string(&json(Path::new("camera"), None, camera).ok()?).ok()
+}
+
 fn write_json(path: &Path, json: &impl Serialize) -> Result<(), Error> {
     let mut text =
         serde_json::to_string_pretty(json).map_err(|cause| Error::Json { path: path.to_owned(), cause })?;

@@ -134,6 +134,8 @@ fn metadata_come_back() {
         options: Some("--exp lerp256 ü".to_owned()),
         pixels_per_inch: Some(300.0),
         input_hash: Some("00ff".to_owned()),
+        camera: Some("{}".to_owned()),
+        crop: None,
     };
     let mut film = film(PixelRect::new(0, 0, 2, 2), AovSelection::ALL);
     film.position_origin = DVec3::new(500_000.25, 0.0, -1.0);
@@ -150,6 +152,7 @@ fn metadata_come_back() {
         ("engine", "reference"),
         ("options", "--exp lerp256 ü"),
         ("inputHash", "00ff"),
+        ("camera", "{}"),
         ("positionOrigin", "500000.25 0 -1"),
     ];
     for (name, value) in texts {
@@ -208,4 +211,125 @@ fn each_aov_may_have_a_file_of_its_own() {
     let color = read_back(&fs::read(&path).unwrap());
     assert_eq!(color.layer_data.channel_data.list.len(), 4);
     assert_eq!(samples(&color, "G"), samples(&whole, "G"));
+}
+
+/// What was written, as it is read back from a file, with that file's bytes.
+fn read_again(film: &Film, metadata: &Metadata, options: &ExrOptions) -> (picture::ExrPicture, Vec<u8>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    write_exr(&path, film, metadata, options).unwrap();
+    (picture::read_exr(&path).unwrap(), fs::read(&path).unwrap())
+}
+
+/// A film of samples 4 to 8 of 16, with sums.
+fn part_of_the_samples() -> (Film, Metadata) {
+    let window = PixelRect::new(5, 3, 38, 30);
+    let mut film = film(window, AovSelection::ALL);
+    film.position_origin = DVec3::new(500_000.25, 0.0, -1.0);
+    let ending = Ending { background: Some([0.1, 0.25, 3e-9, 1.0]), display_space: true };
+    let mut sums = SampleSums::new(4, ending, &window, AovSelection::ALL).unwrap();
+    for (number, plane) in sums.planes.iter_mut().enumerate() {
+        plane.iter_mut().enumerate().for_each(|(i, value)| *value = 1.0 / (number + 3 * i + 1) as f64);
+    }
+    film.sums = Some(sums);
+    let metadata = Metadata {
+        software: Some("splat 0.1.0".to_owned()),
+        world_to_camera: Some(DMat4::from_cols_array(&std::array::from_fn(|i| 0.1 * i as f64))),
+        samples: Some(16),
+        sample_range: Some(4..8),
+        seed: Some(u64::MAX),
+        engine: Some("fast".to_owned()),
+        options: Some("--exp poly8 \u{fc}".to_owned()),
+        pixels_per_inch: Some(300.0),
+        input_hash: Some("00ff".to_owned()),
+        camera: Some("{}".to_owned()),
+        crop: None,
+    };
+    (film, metadata)
+}
+
+#[test]
+fn our_files_are_read_and_written_again_to_the_byte() {
+    let (film, metadata) = part_of_the_samples();
+    let compressions =
+        [Compression::None, Compression::Rle, Compression::Zip, Compression::Zips, Compression::Piz];
+    for compression in compressions {
+        for full_floats in [false, true] {
+            let options = ExrOptions { full_floats, compression, ..ExrOptions::default() };
+            let (read, bytes) = read_again(&film, &metadata, &options);
+            assert_eq!(read.metadata, metadata);
+            assert_eq!(read.window, film.window);
+            assert_eq!(read.frame, PixelRect::new(0, 0, 64, 48));
+            assert_eq!(read.position_origin, Some(film.position_origin));
+            assert_eq!(read.compression, Some(compression));
+            assert_eq!(read.film_of_sums().unwrap().sums, film.sums);
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("again.exr");
+            picture::write_exr_picture(&path, &read, compression).unwrap();
+            assert!(fs::read(&path).unwrap() == bytes, "{compression:?} {full_floats}");
+            let mut of_film = read.clone();
+            of_film.set_film(&film, full_floats).unwrap();
+            assert_eq!(of_film, read);
+        }
+    }
+}
+
+#[test]
+fn pictures_of_other_programs_are_read() {
+    use exr::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    let pixel = |position: Vec2<usize>| {
+        (f16::from_f32(position.x() as f32), f16::from_f32(position.y() as f32), f16::from_f32(0.5))
+    };
+    for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(16, 8))] {
+        let encoding =
+            Encoding { compression: Compression::PXR24, blocks, line_order: LineOrder::Increasing };
+        let image = Image::from_encoded_channels((37, 21), encoding, SpecificChannels::rgb(pixel));
+        image.write().to_file(&path).unwrap();
+        let read = picture::read_exr(&path).unwrap();
+        assert_eq!(read.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["B", "G", "R"]);
+        assert_eq!((read.window.width(), read.window.height(), read.compression), (37, 21, None));
+        assert_eq!(read.metadata, Metadata::default());
+        for (index, (x, y)) in (0..21).flat_map(|y| (0..37).map(move |x| (x, y))).enumerate() {
+            assert_eq!(read.channel("R").unwrap().get(index), f64::from(x));
+            assert_eq!(read.channel("G").unwrap().get(index), f64::from(y));
+        }
+    }
+}
+
+#[test]
+fn damaged_files_are_errors() {
+    let (film, metadata) = part_of_the_samples();
+    let film = film.part(PixelRect::new(5, 3, 12, 9));
+    let options = ExrOptions { compression: Compression::Zips, ..ExrOptions::default() };
+    let (_, bytes) = read_again(&film, &metadata, &options);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.exr");
+    let read = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        picture::read_exr(&path)
+    };
+    for length in (0..bytes.len()).step_by(61).chain(bytes.len() - 3..bytes.len()) {
+        assert!(read(&bytes[..length]).is_err(), "{length} of {}", bytes.len());
+    }
+    let mut next = 1_u32;
+    for _ in 0..400 {
+        next = next.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let mut damaged = bytes.clone();
+        let place = next as usize % damaged.len();
+        damaged[place] ^= 1 << (next >> 29);
+        // Whatever it says, it does not panic; and what is read can be used.
+        if let Ok(read) = read(&damaged) {
+            let _film = read.film_of_sums();
+            let piece = crate::Piece { path: path.clone(), picture: read };
+            let _merged = crate::merge(vec![piece], None);
+        }
+    }
+    // A header that claims 16384 x 16384 pixels.
+    let place = bytes.windows(16).position(|window| window == b"dataWindow\0box2i").unwrap() + 17 + 4;
+    let mut huge = bytes;
+    huge[place + 8..place + 12].copy_from_slice(&(5 + 16_383_i32).to_le_bytes());
+    huge[place + 12..place + 16].copy_from_slice(&(3 + 16_383_i32).to_le_bytes());
+    assert!(matches!(read(&huge), Err(Error::Invalid { .. })));
 }

@@ -46,16 +46,23 @@ pub(super) struct Header {
     is_copc: bool,
 }
 
+/// Checks the first four bytes of a file.
+pub(super) fn check_magic(bytes: &[u8], path: &Path) -> Result<(), Error> {
+    if bytes.starts_with(b"LASF") {
+        return Ok(());
+    }
+    let start = quoted(&bytes[..bytes.len().min(4)]);
+    let found = if bytes.is_empty() { "an empty file".to_owned() } else { start };
+    Err(Error::invalid(path, Place::Byte(0), found, "LASF"))
+}
+
 impl Header {
     /// Reads and checks the header.
     pub fn read(bytes: &[u8], path: &Path) -> Result<Self, Error> {
         let invalid = |at: usize, found: String, expected: &str| {
             Err(Error::invalid(path, Place::Byte(at as u64), found, expected))
         };
-        if !bytes.starts_with(b"LASF") {
-            let start = quoted(&bytes[..bytes.len().min(4)]);
-            return invalid(0, if bytes.is_empty() { "an empty file".to_owned() } else { start }, "LASF");
-        }
+        check_magic(bytes, path)?;
         let (Some([major, minor]), true) = (bytes_at(bytes, 24), bytes.len() >= HEADER_BYTES) else {
             return invalid(bytes.len(), "the end of the file".to_owned(), "a header of at least 227 bytes");
         };

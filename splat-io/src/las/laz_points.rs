@@ -10,6 +10,7 @@
 //! where nothing can be passed over: a file made for the purpose could exhaust the stack.
 
 use super::bytes_at;
+use super::gps_time::GpsTimes;
 use super::header::Header;
 use super::points::Points;
 use crate::{Error, Place};
@@ -24,6 +25,13 @@ use std::path::Path;
 /// How many points get room at a time: their number is a claim that only decoding proves.
 const ROOM: u64 = 1 << 16;
 
+/// A file has at most so many points a byte, beyond the first [`FREE_POINTS`]. Surveys have less than one; points that the
+/// decoder can foretell take next to nothing, so that a few bytes could go on for hours.
+const MOST_POINTS_A_BYTE: u64 = 100;
+
+/// So many points are accepted from a file of any size.
+const FREE_POINTS: u64 = 1 << 20;
+
 /// Reads the compressed points.
 pub(super) fn read(bytes: &[u8], header: &Header, points: &mut Points, path: &Path) -> Result<(), Error> {
     let record = header.record(bytes, b"laszip encoded", LazVlr::RECORD_ID);
@@ -33,6 +41,12 @@ pub(super) fn read(bytes: &[u8], header: &Header, points: &mut Points, path: &Pa
     };
     if header.count == 0 {
         return Ok(());
+    }
+    let most = FREE_POINTS + MOST_POINTS_A_BYTE * bytes.len() as u64;
+    if header.count > most {
+        let found = format!("a header that claims {} compressed points", header.count);
+        let expected = format!("at most {most} in a file of {} bytes", bytes.len());
+        return Err(Error::invalid(path, Place::File, found, expected));
     }
     let layout = Layout::read(record, header, path)?;
     let chunks = layout.chunks(bytes, header, path)?;
@@ -187,12 +201,21 @@ impl Layout {
             return Err(Failure::Decoder("layers longer than their chunk".to_owned()));
         }
         let source = Cursor::new(chunk);
+        let failure = |error: laz::LasZipError| Failure::Decoder(error.to_string());
         let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if self.is_layered {
-            Box::new(LayeredPointRecordDecompressor::new(source))
+            let mut decoder = LayeredPointRecordDecompressor::new(source);
+            decoder.set_fields_from(self.record.items()).map_err(failure)?;
+            Box::new(decoder)
         } else {
-            Box::new(SequentialPointRecordDecompressor::new(source))
+            let mut decoder = SequentialPointRecordDecompressor::new(source);
+            for item in self.record.items() {
+                match (item.item_type(), item.version()) {
+                    (LazItemType::GpsTime, 2) => decoder.add_field_decompressor(GpsTimes::new()),
+                    _ => decoder.set_fields_from(&vec![*item]).map_err(failure)?,
+                }
+            }
+            Box::new(decoder)
         };
-        decoder.set_fields_from(self.record.items()).map_err(|error| Failure::Decoder(error.to_string()))?;
         decoder.set_selection(
             DecompressionSelection::all().skip_gps_time().skip_wavepacket().skip_extra_bytes(),
         );

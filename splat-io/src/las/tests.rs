@@ -2,7 +2,11 @@
 
 use super::*;
 use glam::{DVec3, Vec3};
+use laz::encoders::ArithmeticEncoder;
+use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
+use laz::record::{FieldCompressor, RecordCompressor, SequentialPointRecordCompressor};
 use splat_core::{Cloud, Field};
+use std::io::Cursor;
 
 fn read(bytes: &[u8]) -> Result<Import, Error> {
     read_las_from(bytes, Path::new("a.las"))
@@ -152,7 +156,10 @@ fn lying_headers_are_refused_with_their_place() {
             "byte 131: found a scale of 0.01 and an offset of NaN",
         ),
         (message(&packed, 107, &[4]), "after 3 points, expected 4 compressed points"),
-        (message(&packed, 107, &(u32::MAX - 2).to_le_bytes()), "expected 4294967293 compressed points"),
+        (
+            message(&packed, 107, &(u32::MAX - 2).to_le_bytes()),
+            "a header that claims 4294967293 compressed points, expected at most",
+        ),
         (message(&packed, 229, b"x"), "found compressed points, expected the record of user"),
         (message(&packed, 104, &[0x80]), "does not fit point format 0 of 26 bytes"),
     ];
@@ -198,4 +205,101 @@ fn no_damage_makes_a_panic() {
             assert!(!outcome.is_err_and(|message| message.contains("nonsense")));
         }
     }
+}
+
+/// A file of point format 1 in one chunk, its GPS times by a compressor of the test's choice.
+fn with_times<C>(points: u32, times: C, time: impl Fn(u32) -> i64) -> Vec<u8>
+where
+    C: FieldCompressor<Cursor<Vec<u8>>> + Send + Sync,
+{
+    let vlr = laz::LazVlrBuilder::default().with_point_format(1, 0).unwrap().build();
+    let mut description = Vec::new();
+    vlr.write_to(&mut description).unwrap();
+    // Without chunks.
+    description[0] = 1;
+    let mut bytes = written(&Cloud::default(), false);
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    put(96, &(227 + 54 + description.len() as u32).to_le_bytes());
+    put(104, &[0x81, 28, 0]);
+    put(107, &points.to_le_bytes());
+    put(131, &[0.01_f64.to_le_bytes(); 3].concat());
+    let mut head = [0; 54];
+    head[2..16].copy_from_slice(b"laszip encoded");
+    head[18..20].copy_from_slice(&laz::LazVlr::RECORD_ID.to_le_bytes());
+    head[20..22].copy_from_slice(&(description.len() as u16).to_le_bytes());
+    bytes.extend(head);
+    bytes.extend(description);
+    let mut compressor = SequentialPointRecordCompressor::new(Cursor::new(Vec::new()));
+    compressor.add_field_compressor(laz::las::v2::LasPoint0Compressor::default());
+    compressor.add_field_compressor(times);
+    for point in 0..points {
+        let mut record = [0; 28];
+        record[..4].copy_from_slice(&x_of(point).to_le_bytes());
+        record[20..].copy_from_slice(&time(point).to_le_bytes());
+        compressor.compress_next(&record).unwrap();
+    }
+    compressor.done().unwrap();
+    bytes.extend(compressor.into_inner().into_inner());
+    bytes
+}
+
+/// The coordinate of a point of [`with_times`], in hundredths.
+fn x_of(point: u32) -> u32 {
+    point * point % 9973
+}
+
+#[test]
+fn gps_times_of_the_older_compression_are_followed() {
+    let noise = |point: u32| i64::from(point.wrapping_mul(2_654_435_761) >> 7);
+    let times: [&dyn Fn(u32) -> i64; 6] = [
+        &|_| 7,
+        &|point| 1000 * i64::from(point),
+        // Multiples of all sizes, both ways, and the same time again.
+        &|point| 50 * (noise(point) % 1200 - 300) * i64::from(point % 5),
+        &|point| noise(point) << (point % 40),
+        // Sequences far apart, by turns.
+        &|point| (i64::from(point % 4) << 40) + i64::from(point) * 300,
+        &|point| ((noise(point) % 7) << 40) + i64::from(point) * 300 * (noise(point) % 3),
+    ];
+    for (number, time) in times.into_iter().enumerate() {
+        let count = 3000;
+        let import = read(&with_times(count, laz::las::v2::GpsTimeCompressor::default(), time)).unwrap();
+        assert_eq!(import.cloud.len(), count as usize);
+        for point in 0..count {
+            let x = f64::from(x_of(point)) / 100.0;
+            let found = import.cloud.world_position(point as usize).x;
+            assert!((found - x).abs() < 1e-5, "times {number}, point {point}: {found}, not {x}");
+        }
+    }
+}
+
+/// Says of the second point that its time belongs to another sequence, a million times over.
+struct Astray(ArithmeticModel);
+
+impl FieldCompressor<Cursor<Vec<u8>>> for Astray {
+    fn size_of_field(&self) -> usize {
+        8
+    }
+
+    fn compress_first(&mut self, out: &mut Cursor<Vec<u8>>, time: &[u8]) -> std::io::Result<()> {
+        std::io::Write::write_all(out, time)
+    }
+
+    fn compress_with(
+        &mut self,
+        encoder: &mut ArithmeticEncoder<Cursor<Vec<u8>>>,
+        _time: &[u8],
+    ) -> std::io::Result<()> {
+        (0..1_000_000).try_for_each(|_| encoder.encode_symbol(&mut self.0, 3))
+    }
+}
+
+/// The crate's decoder overflows the stack here, which no one can catch.
+#[test]
+fn gps_times_cannot_go_astray() {
+    let model = ArithmeticModelBuilder::new(6).with_compression(true).build();
+    let bytes = with_times(2, Astray(model), |_| 0);
+    assert!(bytes.len() < 600, "{}", bytes.len());
+    let message = read(&bytes).unwrap_err().to_string();
+    assert!(message.contains("a GPS time that goes from sequence to sequence after 1 points"), "{message}");
 }

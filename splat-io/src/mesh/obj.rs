@@ -9,7 +9,7 @@ use super::{Mesh, MeshImport, NO_INDEX, fan};
 use crate::error::quoted;
 use crate::ply::open;
 use crate::source::Source;
-use crate::{ElementReport, Error, ImportReport, Place};
+use crate::{ElementReport, Error, ImportReport, Loss, Place};
 use glam::{DVec2, DVec3, Vec3};
 use std::io::Read;
 use std::path::Path;
@@ -81,7 +81,7 @@ pub fn read_obj_from(reader: impl Read, size: u64, path: &Path) -> Result<MeshIm
         })?;
     }
     let (sha256, bytes) = lines.source.finish()?;
-    let elements = parser.elements();
+    let (elements, losses) = (parser.elements(), parser.losses());
     let (mesh, assumptions) = parser.finish(path)?;
     let report = ImportReport {
         path: path.to_owned(),
@@ -90,6 +90,7 @@ pub fn read_obj_from(reader: impl Read, size: u64, path: &Path) -> Result<MeshIm
         sha256,
         elements,
         assumptions,
+        losses,
     };
     Ok(MeshImport { mesh, report })
 }
@@ -173,8 +174,10 @@ struct Parser {
     has_normals: bool,
     /// The greatest index used of each kind, and its line.
     greatest: [(u64, u64); 3],
-    other_geometry: u64,
-    unknown: u64,
+    /// Lines that are passed over, and the number of the first.
+    other_geometry: (u64, u64),
+    unknown: (u64, u64),
+    /// What that line begins with.
     first_unknown: String,
     /// The face that is being read.
     corners: Vec<Corner>,
@@ -205,14 +208,14 @@ impl Parser {
             b"f" | b"fo" => self.face(words, number),
             _ if SILENT.contains(&keyword) => Ok(()),
             _ if OTHER_GEOMETRY.contains(&keyword) => {
-                self.other_geometry += 1;
+                count_line(&mut self.other_geometry, number);
                 Ok(())
             }
             _ => {
-                if self.unknown == 0 {
+                if self.unknown.0 == 0 {
                     self.first_unknown = format!("{} in line {number}", quoted(keyword));
                 }
-                self.unknown += 1;
+                count_line(&mut self.unknown, number);
                 Ok(())
             }
         }
@@ -291,6 +294,18 @@ impl Parser {
         counts.into_iter().filter(|&(_, count)| count > 0).map(element).collect()
     }
 
+    /// The lines that are passed over.
+    fn losses(&self) -> Vec<Loss> {
+        let kinds = [
+            (self.other_geometry, "lines of points, lines, curves or free-form surfaces"),
+            (self.unknown, "lines of unknown meaning"),
+        ];
+        kinds
+            .into_iter()
+            .filter_map(|((count, line), what)| Loss::new(what, count, format!("line {line}")))
+            .collect()
+    }
+
     /// Checks what could not be checked before, and says what was assumed.
     fn finish(self, path: &Path) -> Result<(Mesh, Vec<String>), Error> {
         let mut mesh = self.mesh;
@@ -318,18 +333,24 @@ impl Parser {
             mesh.colors = Some(colors);
             assumptions.push(assumption);
         }
-        if self.other_geometry > 0 {
-            let count = self.other_geometry;
+        if let (count @ 1.., _) = self.other_geometry {
             assumptions.push(format!(
                 "{count} lines of points, lines, curves or free-form surfaces are passed over"
             ));
         }
-        if self.unknown > 0 {
-            let (count, first) = (self.unknown, self.first_unknown);
+        if let ((count @ 1.., _), first) = (self.unknown, self.first_unknown) {
             assumptions.push(format!("{count} lines of unknown meaning are passed over, the first {first}"));
         }
         Ok((mesh, assumptions))
     }
+}
+
+/// Counts a line, and keeps the number of the first.
+fn count_line((count, first): &mut (u64, u64), line: u64) {
+    if *count == 0 {
+        *first = line;
+    }
+    *count += 1;
 }
 
 /// sRGB colours made linear, for so many vertices; those without are white.

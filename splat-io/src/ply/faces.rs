@@ -3,7 +3,7 @@
 use super::header::Header;
 use crate::mesh::{Mesh, NO_INDEX, fan};
 use crate::table::{Element, Kind};
-use crate::{Error, Place, Usage};
+use crate::{Error, Loss, Place, Usage};
 use glam::DVec2;
 use splat_core::Cloud;
 use std::path::Path;
@@ -31,6 +31,10 @@ pub(super) struct Faces {
     corners: Vec<f64>,
     texture: Vec<f64>,
     mesh: Mesh,
+    /// Number of rows read.
+    rows: u64,
+    /// Number of faces that are left out, and the row of the first.
+    too_few: (u64, u64),
 }
 
 /// The names of the list of corners.
@@ -68,7 +72,16 @@ impl Faces {
                 (lists[index], usages[index]) = (List::Texture, Usage::TextureCoordinate);
             }
         }
-        Self { lists, usages, vertices, corners: Vec::new(), texture: Vec::new(), mesh: Mesh::default() }
+        Self {
+            lists,
+            usages,
+            vertices,
+            corners: Vec::new(),
+            texture: Vec::new(),
+            mesh: Mesh::default(),
+            rows: 0,
+            too_few: (0, 0),
+        }
     }
 
     /// What the property of this index is used for.
@@ -101,6 +114,14 @@ impl Faces {
             return Err(Error::invalid(path, place(), format!("a face with the vertex {wrong}"), expected));
         }
         let corners = self.corners.len();
+        if corners < 3 {
+            let (count, first) = &mut self.too_few;
+            if *count == 0 {
+                *first = self.rows;
+            }
+            *count += 1;
+        }
+        self.rows += 1;
         fan(corners, |corner| self.corners[corner] as u32, &mut self.mesh.triangles);
         if !self.lists.contains(&List::Texture) {
             return Ok(());
@@ -113,6 +134,12 @@ impl Faces {
         self.mesh.texture_coordinates.extend(self.texture.chunks_exact(2).map(DVec2::from_slice));
         fan(corners, |corner| (first + corner) as u32, &mut self.mesh.texture_triangles);
         Ok(())
+    }
+
+    /// The faces that were left out.
+    pub fn losses(&self) -> Option<Loss> {
+        let (count, first) = self.too_few;
+        Loss::new("faces of fewer than three corners", count, format!("face {first}"))
     }
 
     /// The mesh of these faces between the points of a cloud.

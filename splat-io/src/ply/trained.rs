@@ -4,7 +4,7 @@ use super::compressed::{PackedSplats, is_packed};
 use super::gaussians::{Splats, is_trained};
 use super::header::Header;
 use super::rows::{Rows, Table, Tables};
-use super::{read_tables, report};
+use super::{behind, read_tables, report};
 use crate::source::Source;
 use crate::table::Element;
 use crate::trained::Gaussians;
@@ -22,6 +22,7 @@ pub(super) fn read<R: Read>(header: &Header, mut source: Source<R>) -> Result<Im
     let points = header.points(&path)?;
     let read = if is_packed(&header.elements[points]) { read_packed } else { read_plain };
     let splats = read(header, points, &mut source)?;
+    let more = behind(header, splats.end, &mut source)?;
     let (sha256, bytes) = source.finish()?;
     let elements = header.elements.iter().enumerate().map(|(index, element)| {
         let mut report = report(element, splats.usages[index].as_ref());
@@ -35,6 +36,7 @@ pub(super) fn read<R: Read>(header: &Header, mut source: Source<R>) -> Result<Im
         sha256,
         elements: elements.collect(),
         assumptions: splats.gaussians.assumptions(splats.flat),
+        losses: more.into_iter().collect(),
     };
     Ok(Import { cloud: splats.gaussians.finish(), report })
 }
@@ -45,6 +47,8 @@ struct TrainedTables {
     /// Whether they are 2DGS.
     flat: bool,
     kind: &'static str,
+    /// Number of tables up to the last one that was read.
+    end: usize,
     /// Per element, if it is used: per property.
     usages: Vec<Option<Vec<Usage>>>,
 }
@@ -57,10 +61,11 @@ fn read_plain<R: Read>(
     header.check_claims(points, points, source)?;
     let mut table = OneTable { index: points, rows: Splats::new(&header.elements[points], source.path())? };
     read_tables(header, source, &mut table)?;
+    let end = table.end();
     let Splats { gaussians, flat, usages, .. } = table.rows;
     let mut all = vec![None; header.elements.len()];
     all[points] = Some(usages);
-    Ok(TrainedTables { gaussians, flat, kind: "trained splats", usages: all })
+    Ok(TrainedTables { gaussians, flat, kind: "trained splats", end, usages: all })
 }
 
 fn read_packed<R: Read>(
@@ -72,8 +77,9 @@ fn read_packed<R: Read>(
     let mut packed = PackedSplats::new(header, points, source.path())?;
     read_tables(header, source, &mut packed)?;
     let usages = (0..header.elements.len()).map(|index| packed.usages(index)).collect();
+    let end = packed.end();
     let gaussians = packed.unpack(source.path())?;
-    Ok(TrainedTables { gaussians, flat: false, kind: "compressed trained splats", usages })
+    Ok(TrainedTables { gaussians, flat: false, kind: "compressed trained splats", end, usages })
 }
 
 /// A file of which one table is wanted.

@@ -6,7 +6,7 @@ use super::roles::{
 };
 use super::scalar::Scalar;
 use super::tone::Tone;
-use crate::{Error, Usage};
+use crate::{Error, Loss, Usage};
 use glam::{DVec3, Vec2, Vec3};
 use splat_core::{Cloud, Field, Shapes, TextureCoordinates};
 use std::collections::TryReserveError;
@@ -24,7 +24,8 @@ pub(crate) struct Columns {
     greatest_color: f32,
     opacity_scale: f64,
     opacities: Option<Vec<f32>>,
-    clamped_opacities: usize,
+    /// Number of opacities that were clamped, and the row of the first.
+    clamped_opacities: (u64, usize),
     sizes: Option<Vec<f32>>,
     areas: Option<Vec<f32>>,
     tangents: Option<Vec<[Vec3; 2]>>,
@@ -50,6 +51,7 @@ pub(crate) struct Outcome {
     pub assumptions: Vec<String>,
     /// Of colours and opacities.
     pub color_assumptions: Vec<String>,
+    pub losses: Vec<Loss>,
 }
 
 impl Columns {
@@ -75,7 +77,7 @@ impl Columns {
             greatest_color: 0.0,
             opacity_scale: range.map_or(1.0, |(_, greatest)| 1.0 / greatest as f64),
             opacities: kinds[OPACITY].map(|_| Vec::new()),
-            clamped_opacities: 0,
+            clamped_opacities: (0, 0),
             sizes: kinds[SIZE].map(|_| Vec::new()),
             areas: kinds[AREA].map(|_| Vec::new()),
             tangents: kinds[TANGENTS.start].map(|_| Vec::new()),
@@ -129,7 +131,11 @@ impl Columns {
             let mut opacity = row[OPACITY] * self.opacity_scale;
             if opacity.is_finite() && !(0.0..=1.0).contains(&opacity) {
                 opacity = opacity.clamp(0.0, 1.0);
-                self.clamped_opacities += 1;
+                let (count, first) = &mut self.clamped_opacities;
+                if *count == 0 {
+                    *first = opacities.len();
+                }
+                *count += 1;
             }
             opacities.push(opacity as f32);
         }
@@ -192,7 +198,10 @@ impl Columns {
         cloud.areas = self.areas;
         cloud.texture_coordinates = self.texture_coordinates;
         cloud.fields = self.fields;
-        Outcome { cloud, usages: self.roles.usages, assumptions, color_assumptions }
+        let (clamped, first) = self.clamped_opacities;
+        let losses = Loss::new("opacities outside [0, 1]", clamped, format!("point {first}"));
+        let losses = losses.into_iter().collect();
+        Outcome { cloud, usages: self.roles.usages, assumptions, color_assumptions, losses }
     }
 
     fn drop_zero_normals(&mut self, assumptions: &mut Vec<String>) {
@@ -225,8 +234,7 @@ impl Columns {
                 assumptions.push(format!("float colors reach {greatest}: they are not scaled to 0 to 1"));
             }
         }
-        if self.clamped_opacities > 0 {
-            let count = self.clamped_opacities;
+        if let (count @ 1.., _) = self.clamped_opacities {
             assumptions.push(format!("{count} opacities outside [0, 1] are clamped"));
         }
     }

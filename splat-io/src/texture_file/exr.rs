@@ -1,6 +1,7 @@
 //! OpenEXR. Headers and the places of blocks are read here, with every claim checked; the crate `exr` unpacks single blocks, of
 //! sizes that have been checked.
 
+pub(crate) mod channels;
 mod header;
 
 use super::{Image, check_size, zeros};
@@ -247,7 +248,8 @@ impl<'a> Layout<'a> {
         let pixel_bytes: usize = channels.iter().map(|channel| channel.sample_type.bytes_per_sample()).sum();
 
         let claimed = pixels as u64 * pixel_bytes as u64;
-        if claimed > file_size.saturating_mul(most_bytes_of_one(compression)) {
+        let most = file_size.saturating_mul(most_bytes_of_one(compression));
+        if claimed > most.min(FREE_BYTES.max(file_size.saturating_mul(MOST_RATIO))) {
             return Err(Error::invalid(
                 path,
                 Place::Field("dataWindow"),
@@ -280,7 +282,7 @@ impl<'a> Layout<'a> {
                 (place, [bytes.i32()?, bytes.i32()?] == [0, 0])
             }
             None => {
-                let row = i64::from(bytes.i32()?) - i64::from(self.part.first_row);
+                let row = i64::from(bytes.i32()?) - i64::from(self.part.corner[1]);
                 let lines = self.compression.scan_lines_per_block() as i64;
                 if row.rem_euclid(lines) != 0 {
                     return Err(
@@ -304,6 +306,13 @@ impl<'a> Layout<'a> {
     }
 }
 
+/// Unpacked bytes beyond [`FREE_BYTES`] that are accepted for each byte of a file. DWA can make far more of one, but only of
+/// pictures of one colour, and none of such a size have been seen.
+const MOST_RATIO: u64 = 1400;
+
+/// An image of so many bytes, all channels together, may be as small a file as its compression can make it.
+const FREE_BYTES: u64 = 1 << 28;
+
 /// How many bytes a packed byte can become, at most. Deflate: 258 for two bits. Its product with 4/3 for PXR24's 24-bit
 /// floats, and PIZ's run lengths (255 16-bit values for 9 bits), stay below 1400; DWA deflates run lengths, or one
 /// word for a square of 64 values.
@@ -313,7 +322,7 @@ fn most_bytes_of_one(compression: Compression) -> u64 {
         Compression::RLE => 64,
         Compression::B44 | Compression::B44A => 64,
         Compression::DWAA(_) | Compression::DWAB(_) => 1 << 17,
-        _ => 1400,
+        _ => MOST_RATIO,
     }
 }
 

@@ -15,7 +15,21 @@ const DECODER_BYTES: usize = 256 << 20;
 /// Deflate makes at most this many bytes of one.
 const MOST_BYTES_OF_ONE: u64 = 1032;
 
-pub(super) fn read(reader: impl BufRead + Seek, size: u64, path: &Path) -> Result<Image, Error> {
+/// An image as the file has it.
+pub(crate) struct Decoded {
+    pub size: [u32; 2],
+    /// Samples of a pixel.
+    pub channels: usize,
+    /// Whether the last of them is alpha.
+    pub has_alpha: bool,
+    /// Whether samples have 16 bits, the most significant byte first, or else 8.
+    pub is_16_bit: bool,
+    /// Row by row.
+    pub data: Vec<u8>,
+}
+
+/// Unpacks an image to 8 or 16 bits a sample.
+pub(crate) fn decode(reader: impl BufRead + Seek, size: u64, path: &Path) -> Result<Decoded, Error> {
     let mut decoder = Decoder::new_with_limits(reader, Limits { bytes: DECODER_BYTES });
     decoder.set_transformations(Transformations::EXPAND);
     decoder.set_ignore_text_chunk(true);
@@ -40,9 +54,18 @@ pub(super) fn read(reader: impl BufRead + Seek, size: u64, path: &Path) -> Resul
     let mut data = zeros::<u8>(path, bytes)?;
     reader.next_frame(&mut data).map_err(|error| blame(path, error))?;
 
-    let size = [width, height];
-    let has_alpha = matches!(color, ColorType::GrayscaleAlpha | ColorType::Rgba);
-    if depth == BitDepth::Sixteen {
+    Ok(Decoded {
+        size: [width, height],
+        channels,
+        has_alpha: matches!(color, ColorType::GrayscaleAlpha | ColorType::Rgba),
+        is_16_bit: depth == BitDepth::Sixteen,
+        data,
+    })
+}
+
+pub(super) fn read(reader: impl BufRead + Seek, size: u64, path: &Path) -> Result<Image, Error> {
+    let Decoded { size, channels, has_alpha, is_16_bit, mut data } = decode(reader, size, path)?;
+    if is_16_bit {
         return linear16(size, channels, has_alpha, &data, path);
     }
     if !has_alpha {

@@ -73,6 +73,7 @@ pub fn read_splat_from(reader: impl Read, size: u64, path: &Path) -> Result<Impo
         sha256,
         elements: vec![element(count)],
         assumptions,
+        losses: Vec::new(),
     };
     Ok(Import { cloud: gaussians.finish(), report })
 }

@@ -20,8 +20,7 @@
 
 use super::{Gaussian, Gaussians};
 use crate::error::quoted;
-use crate::ply::open;
-use crate::source::Source;
+use crate::whole_file::{read_rest, read_whole, sha256};
 use crate::{ElementReport, Error, Import, ImportReport, Place, PropertyReport, Usage};
 use flate2::read::GzDecoder;
 use glam::{DVec3, Vec3};
@@ -64,8 +63,11 @@ const TURNED: [f32; 16] =
 /// [`Error::Invalid`] for anything malformed, truncated, or claiming more than such a file can hold; [`Error::Limit`] for
 /// 2^32 - 1 splats or more, or more than memory.
 pub fn read_spz(path: &Path) -> Result<Import, Error> {
-    let (file, size) = open(path)?;
-    read_spz_from(file, size, path)
+    let check = |head: &[u8], path: &Path| match head.starts_with(&GZIP) {
+        true => Ok(()),
+        false => File { bytes: head, path }.check_magic(),
+    };
+    import(&read_whole(path, check)?, path)
 }
 
 /// Reads trained splats from the `size` bytes of an `.spz` file that `reader` yields; `path` is its name in messages.
@@ -73,22 +75,24 @@ pub fn read_spz(path: &Path) -> Result<Import, Error> {
 /// # Errors
 /// As [`read_spz`].
 pub fn read_spz_from(reader: impl Read, size: u64, path: &Path) -> Result<Import, Error> {
-    let mut source = Source::new(reader, size, path);
-    let too_large = |_| Error::limit(path, format!("a file of {size} bytes"), "this machine's memory");
-    source.want(usize::try_from(size).map_err(too_large)?)?;
-    let file = File { bytes: source.window(), path };
+    import(&read_rest(Vec::new(), reader, size, path)?, path)
+}
+
+/// Reads trained splats from the bytes of a file.
+fn import(bytes: &[u8], path: &Path) -> Result<Import, Error> {
+    let file = File { bytes, path };
     let (header, streams) = file.read()?;
     let gaussians = file.gaussians(&header, &streams)?;
     let mut assumptions = gaussians.assumptions(false);
     assumptions.push("y is up and z back in the file: turned to y down, z forward".to_owned());
-    let (sha256, bytes) = source.finish()?;
     let report = ImportReport {
         path: path.to_owned(),
         format: format!("spz, version {}", header.version),
-        bytes,
-        sha256,
+        bytes: bytes.len() as u64,
+        sha256: sha256(bytes),
         elements: vec![header.element()],
         assumptions,
+        losses: Vec::new(),
     };
     Ok(Import { cloud: gaussians.finish(), report })
 }
@@ -204,14 +208,23 @@ impl<'a> File<'a> {
         Ok((header, streams))
     }
 
+    /// Checks the first bytes of what is not packed.
+    fn check_magic(&self) -> Result<(), Error> {
+        match self.bytes {
+            bytes if bytes.starts_with(MAGIC) => Ok(()),
+            bytes if bytes.len() < MAGIC.len() => {
+                Err(self.invalid("the end of the file", "a header of 16 bytes"))
+            }
+            bytes => Err(self.invalid(quoted(&bytes[..4]), "`NGSP`, the first bytes of an .spz file")),
+        }
+    }
+
     /// Understands the first bytes of a header and holds what it claims against the file's size.
     fn header(&self, bytes: &[u8]) -> Result<Header, Error> {
         let Some(bytes) = bytes.first_chunk::<HEADER_BYTES>() else {
             return Err(self.invalid("the end of the file", "a header of 16 bytes"));
         };
-        if !bytes.starts_with(MAGIC) {
-            return Err(self.invalid(quoted(&bytes[..4]), "`NGSP`, the first bytes of an .spz file"));
-        }
+        File { bytes, path: self.path }.check_magic()?;
         let [_, version, count, _] = *bytes.as_chunks::<4>().0 else {
             return Err(self.invalid("the end of the file", "a header of 16 bytes"));
         };

@@ -246,3 +246,48 @@ fn tables_are_read_by_the_whole_part() {
         at_every_level(|| CheckTable { table, x: [of(0), of(LANES)] });
     }
 }
+
+/// The sources of the workspace, but for what was built.
+fn sources(folder: &std::path::Path, found: &mut Vec<std::path::PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder of the workspace") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() && path.file_name().is_none_or(|name| name != "target") {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn unsafe_code_is_in_two_files() {
+    let workspace = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
+    let crates = [
+        "splat-abuffer",
+        "splat-core",
+        "splat-simd",
+        "splat-io",
+        "splat-cli",
+        "splat-bench",
+        "tests",
+        "fuzz",
+    ];
+    let mut with_blocks = Vec::new();
+    for name in crates {
+        let mut files = Vec::new();
+        sources(&workspace.join(name), &mut files);
+        let read = |path: &std::path::Path| std::fs::read_to_string(path).unwrap_or_default();
+        // Apart, so that this very file has none.
+        let words = [["unsafe", "{"], ["unsafe", "fn"], ["unsafe", "impl"], ["unsafe", "extern"]]
+            .map(|words| words.join(" "));
+        with_blocks
+            .extend(files.iter().filter(|file| words.iter().any(|word| read(file).contains(word))).cloned());
+        let roots = ["src/lib.rs", "src/main.rs"].map(|root| workspace.join(name).join(root));
+        for root in roots.iter().filter(|root| root.is_file() && name != "splat-simd") {
+            assert!(read(root).contains("#![forbid(unsafe_code)]"), "{}", root.display());
+        }
+    }
+    with_blocks.sort();
+    let allowed = ["avx2.rs", "avx512.rs"].map(|file| workspace.join("splat-simd/src/lanes").join(file));
+    assert_eq!(with_blocks, allowed);
+}

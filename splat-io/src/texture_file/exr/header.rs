@@ -22,13 +22,24 @@ pub(super) struct Part {
     pub channels: Vec<Channel>,
     /// None where a newer version of the format knows more of them: its number.
     pub compression: Result<Compression, u8>,
-    /// Of the data window.
-    pub first_row: i32,
+    /// First column and row of the data window.
+    pub corner: [i32; 2],
     pub size: [u64; 2],
     pub tiles: Option<Tiles>,
     pub is_deep: bool,
     /// Number of blocks, over all levels.
     pub chunks: u64,
+    /// The attributes that say nothing of where the pixels are.
+    pub attributes: Vec<Attribute>,
+}
+
+/// An attribute, as it stands in the file.
+#[derive(Debug, Clone)]
+pub(super) struct Attribute {
+    pub name: Vec<u8>,
+    /// Its type.
+    pub kind: Vec<u8>,
+    pub value: Vec<u8>,
 }
 
 #[derive(Debug, Clone)]
@@ -97,6 +108,7 @@ fn read_part<R: Read>(
 ) -> Result<Option<Part>, Error> {
     let (mut channels, mut compression, mut window, mut tile_attribute) = (None, None, None, None);
     let (mut kind, mut chunk_count) = (None, None);
+    let mut attributes = Vec::new();
     let mut is_empty = true;
     loop {
         let name = bytes.text(LONGEST_NAME)?;
@@ -116,7 +128,11 @@ fn read_part<R: Read>(
         ];
         let size = u64::from(size);
         let Some(index) = known.iter().position(|&known| known == (&name[..], &kind_name[..])) else {
-            bytes.skip(size)?;
+            if size > LONGEST_ATTRIBUTE {
+                bytes.skip(size)?;
+            } else {
+                attributes.push(Attribute { name, kind: kind_name, value: bytes.take(size)? });
+            }
             continue;
         };
         if size > LONGEST_ATTRIBUTE {
@@ -201,8 +217,8 @@ fn read_part<R: Read>(
         let found = format!("{chunks} blocks of {width} x {height} pixels");
         return Err(bytes.invalid(found, format!("at most {most} in what is left of the file")));
     }
-    let first_row = window[1];
-    Ok(Some(Part { channels, compression, first_row, size, tiles, is_deep, chunks: chunks as u64 }))
+    let (corner, chunks) = ([window[0], window[1]], chunks as u64);
+    Ok(Some(Part { channels, compression, corner, size, tiles, is_deep, chunks, attributes }))
 }
 
 fn short<R>(bytes: &Bytes<'_, R>, attribute: &[u8]) -> Error {
