@@ -71,7 +71,7 @@ pub fn read(
     let read = |path: &Option<PathBuf>, wrap| {
         path.as_ref().map(|path| image(path, wrap, strict, memory, console)).transpose()
     };
-    let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
+    let files = arguments.images();
     Ok(Images {
         hashes: files.map(|path| file_sha256(path)).collect::<Result<_, _>>()?,
         texture: read(&arguments.texture, [wrap; 2])?,

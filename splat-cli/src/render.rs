@@ -1,9 +1,9 @@
 //! `splat render`: clouds in, a picture out.
 
-use crate::arguments::{MaterialArguments, RenderArguments};
+use crate::arguments::RenderArguments;
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
-use crate::checkpoint::{Checkpoint, Checkpoints};
+use crate::checkpoint::{self, Checkpoint, Checkpoints};
 use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
@@ -31,11 +31,11 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         let message = format!("{} exists: name the picture with -o", picture.display());
         return Err(UsageError::new(message).into());
     }
-    let MaterialArguments { texture, environment, .. } = &arguments.material;
-    let files = arguments.inputs.iter().chain(texture).chain(environment).chain(&arguments.camera.camera);
-    output::spare_inputs(&picture, files)?;
+    let inputs = input_files(arguments)?;
+    output::spare_inputs(&picture, &inputs)?;
     output::check_picture(&picture, options.aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
+        output::spare_inputs(path, &inputs)?;
         output::check_file(path)?;
     }
 
@@ -45,6 +45,10 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let Assembled { cloud, reports, image_hashes, materials, color, options } =
         assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
+    for written in shots.iter().map(|shot| &shot.output).chain([&picture]) {
+        output::spare_inputs(written, &inputs)?;
+        output::spare_inputs(&checkpoint::beside(written), &inputs)?;
+    }
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
     let fitted = is_fitted.then(|| Fitted::new(arguments, &cloud, &options)).transpose()?;
 
@@ -89,6 +93,16 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
         statistics::write(&statistics, path)?;
     }
     Ok(())
+}
+
+/// All files that are read: those of the command line, and those that its scene file names.
+fn input_files(arguments: &RenderArguments) -> anyhow::Result<Vec<PathBuf>> {
+    let RenderArguments { inputs, camera, material, .. } = arguments;
+    let sources = scene::sources(arguments)?;
+    let of_sources =
+        sources.iter().flat_map(|source| source.settings.material.images().chain([&source.path]));
+    let cameras = camera.camera.iter().chain(&camera.frames.intrinsic);
+    Ok(inputs.iter().chain(cameras).chain(material.images()).chain(of_sources).cloned().collect())
 }
 
 /// A picture to be made.
