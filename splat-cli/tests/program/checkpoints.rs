@@ -81,7 +81,7 @@ fn a_killed_run_goes_on_to_the_same_bytes() {
         "--size 480x360 --spp 32 --resolve over --background 0.5,0.5,0.5",
         "--size 480x360 --spp 32 --shading edl --crop 10,20,470,340",
         // Whose films have sums.
-        "--size 480x360 --spp 64 --samples 20:60 --aov all --max-memory 1G",
+        "--size 320x240 --spp 64 --samples 20:60 --aov all --max-memory 1G",
     ];
     let mut killed = 0;
     for options in cases {

@@ -183,7 +183,9 @@ fn no_file_that_is_read_is_written() {
     fs::write(folder.join("scene.toml"), scene).unwrap();
     let options = "--size 8x8 --spp 1";
     succeeds(folder, &format!("render red.ply -o image.png {options}"));
-    for (from, to) in [("image.png", "turn-0001.png"), ("red.ply", "out.png.checkpoint")] {
+    for (from, to) in
+        [("image.png", "turn-0001.png"), ("red.ply", "out.png.checkpoint"), ("red.ply", "out.id.exr")]
+    {
         fs::copy(folder.join(from), folder.join(to)).unwrap();
     }
     let contents = || {
@@ -205,6 +207,7 @@ fn no_file_that_is_read_is_written() {
             "turn-0001.png",
         ),
         ("render out.png.checkpoint -o out.png", "out.png.checkpoint"),
+        ("render out.id.exr -o out.png --aov id --aov-files", "out.id.exr"),
     ] {
         let message = fails(folder, &format!("{command} {options}"), 2);
         assert!(message.contains(&format!("would overwrite {spared}")), "{command}: {message}");
