@@ -435,6 +435,13 @@ pub struct MaterialArguments {
     pub refract: Option<f64>,
 }
 
+impl MaterialArguments {
+    /// The images that it names.
+    pub fn images(&self) -> impl Iterator<Item = &PathBuf> {
+        self.texture.iter().chain(&self.environment)
+    }
+}
+
 /// What is written besides the picture, and how.
 #[derive(Debug, Clone, Args)]
 pub struct OutputArguments {

@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::scene::{self, Source};
 use crate::statistics::Times;
 use crate::usage::UsageError;
-use crate::{colors, describe, output, prepare as preparation, resolve, strict};
+use crate::{colors, describe, prepare as preparation, resolve, strict};
 use anyhow::{Context, ensure};
 use splat_core::fit::Up;
 use splat_core::prepare::{PrepareOptions, prepare};
@@ -55,7 +55,6 @@ pub fn assemble(
     let strict = arguments.reading.strict;
     let images = material::read(&arguments.material, strict, arguments.memory, console)?;
     let sources = scene::sources(arguments)?;
-    output::spare_inputs(&arguments.picture(), sources.iter().map(|source| &source.path))?;
     ensure!(
         !sources.is_empty(),
         UsageError::new("the scene file has no [[cloud]]: there is nothing to draw")

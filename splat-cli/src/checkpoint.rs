@@ -3,8 +3,9 @@
 //! A picture's checkpoint holds its finished tiles ([`splat_io::checkpoint`]). That of a sequence is a text that names the
 //! pictures which are complete. Neither is more than a help: where one cannot be written the work goes on without.
 
-use crate::arguments::RenderArguments;
+use crate::arguments::{MaterialArguments, RenderArguments};
 use crate::console::Console;
+use crate::memory::film_bytes_per_pixel;
 use crate::scene;
 use clap::Args;
 use splat_core::setup::View;
@@ -131,17 +132,15 @@ impl<'a> Checkpoints<'a> {
         // What is wrong with a source was said when it was read.
         let sources = scene::sources(self.arguments).unwrap_or_default();
         let materials = sources.iter().map(|source| &source.settings.material);
-        for material in materials.chain([&self.arguments.material]) {
-            for image in [&material.texture, &material.environment].into_iter().flatten() {
-                hashes.push(hash_file(image)?);
-            }
+        for image in materials.chain([&self.arguments.material]).flat_map(MaterialArguments::images) {
+            hashes.push(hash_file(image)?);
         }
         Ok(hash_text(&hashes.join(" ")))
     }
 }
 
 /// Where the checkpoint of a picture is: beside it.
-fn beside(picture: &Path) -> PathBuf {
+pub fn beside(picture: &Path) -> PathBuf {
     let mut name = picture.as_os_str().to_owned();
     name.push(".checkpoint");
     name.into()
@@ -177,13 +176,16 @@ impl Checkpoint<'_> {
         }
         let frame = [self.camera.width, self.camera.height];
         let window = View::new(&self.camera, options).window;
-        if window.area().saturating_mul(options.aovs.bytes_per_pixel()) > options.memory {
+        if window.area().saturating_mul(film_bytes_per_pixel(options)) > options.memory {
             // It is refused at once, by whom knows the words.
             return Ok(None);
         }
         let empty = Film::for_picture(frame, window, options)?;
         match read_checkpoint(&self.path, &self.all.identity(&self.camera)?, empty) {
-            Ok(unfinished) => Ok(Some(unfinished)),
+            Ok(unfinished) => {
+                console.summary(format_args!("{path}: the picture goes on from here"));
+                Ok(Some(unfinished))
+            }
             Err(error @ Error::Invalid { .. }) => {
                 console.warn(format_args!("{error}; the picture is begun again"));
                 Ok(None)

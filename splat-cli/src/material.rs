@@ -71,12 +71,11 @@ pub fn read(
     let read = |path: &Option<PathBuf>, wrap| {
         path.as_ref().map(|path| image(path, wrap, strict, memory, console)).transpose()
     };
-    let files = [&arguments.texture, &arguments.environment].into_iter().flatten();
-    Ok(Images {
-        hashes: files.map(|path| file_sha256(path)).collect::<Result<_, _>>()?,
-        texture: read(&arguments.texture, [wrap; 2])?,
-        environment: read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?,
-    })
+    let texture = read(&arguments.texture, [wrap; 2])?;
+    let environment = read(&arguments.environment, [Wrap::Repeat, Wrap::Clamp])?;
+    // Last: what is refused may be a terabyte.
+    let hashes = arguments.images().map(|path| file_sha256(path)).collect::<Result<_, _>>()?;
+    Ok(Images { hashes, texture, environment })
 }
 
 /// Lays the images on a prepared cloud whose up axis is `up`.

@@ -21,6 +21,11 @@ pub fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let count = pieces.len();
     let pieces = pieces.iter().map(|path| read(path)).collect::<anyhow::Result<Vec<Piece>>>()?;
     let of_pieces = pieces.first().and_then(|piece| piece.picture.compression);
+    if let (Some(crop), Some(Piece { picture: ExrPicture { frame, .. }, .. })) = (crop, pieces.first()) {
+        let [width, height] = [frame.width(), frame.height()];
+        let message = format!("--crop reaches beyond the frame of {width}x{height} pixels");
+        ensure!(crop.intersect(frame) == *crop, UsageError::new(message));
+    }
     let picture = merge(pieces, *crop)?;
     if PictureFormat::from_path(output)? == PictureFormat::Png {
         write_png(output, &film(&picture)?, &picture.metadata, arguments.png_depth.into())?;
@@ -29,7 +34,8 @@ pub fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         write_exr_picture(output, &picture, compression)?;
     }
     let (width, height) = (picture.window.width(), picture.window.height());
-    console.summary(format_args!("{}: {count} pieces joined, {width}x{height} pixels", output.display()));
+    let pieces = if count == 1 { "piece" } else { "pieces" };
+    console.summary(format_args!("{}: {count} {pieces} joined, {width}x{height} pixels", output.display()));
     Ok(())
 }
 

@@ -1,9 +1,9 @@
 //! `splat render`: clouds in, a picture out.
 
-use crate::arguments::{MaterialArguments, RenderArguments};
+use crate::arguments::RenderArguments;
 use crate::assemble::{Assembled, assemble};
 use crate::cameras::Fitted;
-use crate::checkpoint::{Checkpoint, Checkpoints};
+use crate::checkpoint::{self, Checkpoint, Checkpoints};
 use crate::choices::{ExrTypeChoice, ShadingChoice};
 use crate::console::Console;
 use crate::engine::Engine;
@@ -11,8 +11,10 @@ use crate::progress::Progress;
 use crate::statistics::{self, Report, Times, is_stdout};
 use crate::usage::UsageError;
 use crate::values::ViewDirection;
-use crate::{describe, eye_dome, frames, map, material, output, prepare as preparation, resolve, scene};
-use splat_core::{Camera, Cloud, RenderOptions, Statistics};
+use crate::{
+    describe, eye_dome, frames, map, material, output, prepare as preparation, resolve, scene, values,
+};
+use splat_core::{AovSelection, Camera, Cloud, RenderOptions, Statistics};
 use splat_io::{ExrOptions, ImportReport, Metadata, PictureOptions, camera_json, write_picture};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -26,18 +28,8 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let console = arguments.talk.console();
     let progress = Progress::new(arguments.talk.progress, console.quiet);
     let options = resolve::options(arguments, false)?;
-    let picture = arguments.picture();
-    if arguments.output.is_none() && picture.exists() {
-        let message = format!("{} exists: name the picture with -o", picture.display());
-        return Err(UsageError::new(message).into());
-    }
-    let MaterialArguments { texture, environment, .. } = &arguments.material;
-    let files = arguments.inputs.iter().chain(texture).chain(environment).chain(&arguments.camera.camera);
-    output::spare_inputs(&picture, files)?;
-    output::check_picture(&picture, options.aovs, arguments.outputs.aov_files)?;
-    if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
-        output::check_file(path)?;
-    }
+    let inputs = input_files(arguments)?;
+    check_outputs(arguments, options.aovs, &inputs)?;
 
     preparation::use_threads(arguments.outputs.threads.unwrap_or(0));
     let mut engine = Engine::new(arguments.outputs.engine, arguments.outputs.threads, console)?;
@@ -45,6 +37,13 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let Assembled { cloud, reports, image_hashes, materials, color, options } =
         assemble(arguments, console, &progress, &mut times)?;
     let shots = frames::plan(arguments, resolve::default_near(&cloud), console)?;
+    for picture in shots.iter().map(|shot| &shot.output).chain([&arguments.picture()]) {
+        let mut written = vec![picture.clone(), checkpoint::beside(picture)];
+        if arguments.outputs.aov_files {
+            written.extend(values::AOVS.iter().map(|aov| picture.with_extension(format!("{aov}.exr"))));
+        }
+        written.iter().try_for_each(|path| output::spare_inputs(path, &inputs))?;
+    }
     let is_fitted = shots.iter().any(|shot| shot.camera.is_none());
     let fitted = is_fitted.then(|| Fitted::new(arguments, &cloud, &options)).transpose()?;
 
@@ -87,6 +86,32 @@ pub fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     }
     if let Some(path) = &arguments.outputs.stats {
         statistics::write(&statistics, path)?;
+    }
+    Ok(())
+}
+
+/// All files that are read: those of the command line, and those that its scene file names.
+fn input_files(arguments: &RenderArguments) -> anyhow::Result<Vec<PathBuf>> {
+    let RenderArguments { inputs, camera, material, .. } = arguments;
+    let sources = scene::sources(arguments)?;
+    let of_sources =
+        sources.iter().flat_map(|source| source.settings.material.images().chain([&source.path]));
+    let cameras = camera.camera.iter().chain(&camera.frames.intrinsic);
+    Ok(inputs.iter().chain(cameras).chain(material.images()).chain(of_sources).cloned().collect())
+}
+
+/// Checks, before the work, that what will be written can be, and is none of the inputs.
+fn check_outputs(arguments: &RenderArguments, aovs: AovSelection, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let picture = arguments.picture();
+    if arguments.output.is_none() && picture.exists() {
+        let message = format!("{} exists: name the picture with -o", picture.display());
+        return Err(UsageError::new(message).into());
+    }
+    output::spare_inputs(&picture, inputs)?;
+    output::check_picture(&picture, aovs, arguments.outputs.aov_files)?;
+    if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
+        output::spare_inputs(path, inputs)?;
+        output::check_file(path)?;
     }
     Ok(())
 }

@@ -335,6 +335,10 @@ pub fn background(text: &str) -> Result<Background, String> {
         .ok_or_else(|| "expected R,G,B or R,G,B,A (linear, alpha in 0 to 1), or none".to_owned())
 }
 
+/// What `--aov` may name, besides all of them.
+pub const AOVS: [&str; 9] =
+    ["depth", "normal", "albedo", "position", "id", "coverage", "layers", "samples", "variance"];
+
 /// `--aov`: a list of names, or `all`.
 pub fn aovs(text: &str) -> Result<AovSelection, String> {
     let mut aovs = AovSelection::default();
@@ -351,10 +355,7 @@ pub fn aovs(text: &str) -> Result<AovSelection, String> {
             "variance" => aovs.variance = true,
             "all" => aovs = AovSelection::ALL,
             _ => {
-                return Err(format!(
-                    "{name:?} is not one of depth, normal, albedo, position, id, coverage, layers, samples, \
-                     variance, all"
-                ));
+                return Err(format!("{name:?} is not one of {}, all", AOVS.join(", ")));
             }
         }
     }

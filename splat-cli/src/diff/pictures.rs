@@ -151,7 +151,7 @@ impl Pair {
     /// Reads two pictures; of their channels those of `wanted` names, or layers.
     ///
     /// # Errors
-    /// What the readers say; pictures of different sizes, and without a common channel.
+    /// What the readers say; pictures of different sizes, and without a common channel of each wanted name.
     pub fn read(paths: [&PathBuf; 2], wanted: Option<&[String]>) -> anyhow::Result<Self> {
         let [a, b] = [File::read(paths[0])?, File::read(paths[1])?];
         let size = a.size();
@@ -194,6 +194,12 @@ impl Pair {
             }
         }
         only[1].extend(b.into_keys());
+        for part in wanted.into_iter().flatten() {
+            ensure!(
+                channels.iter().any(|(name, _)| belongs(name, part)),
+                "--channels {part}: {paths_a} and {paths_b} have no such channel in common"
+            );
+        }
         ensure!(
             !channels.is_empty(),
             "{paths_a} and {paths_b} have no channel in common that could be compared"

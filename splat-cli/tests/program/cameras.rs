@@ -1,6 +1,6 @@
 //! Cameras from outside: formats, frames, turntables and prints to scale.
 
-use super::common::{Png, fails, message_of, read_png, splat, succeeds};
+use super::common::{Png, fails, message_of, read_png, real_files, splat, succeeds};
 use glam::DVec3;
 use splat_core::{Cloud, Shapes};
 use splat_io::{PlyEncoding, write_ply};
@@ -138,11 +138,6 @@ fn one_run_draws_all_cameras_of_a_model() {
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(json["cameras"][1]["eye"], serde_json::json!([0.5, 0.0, -4.0]));
     assert_eq!(json["cameras"][1]["frame"], 2);
-}
-
-/// The folder of real files, if there is one.
-fn real_files() -> Option<PathBuf> {
-    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
 }
 
 #[test]

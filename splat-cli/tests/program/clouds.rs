@@ -1,12 +1,12 @@
 //! Clouds of every format, from outside: converted, described, coloured and rendered.
 
-use super::common::{PROGRAM, Png, fails, message_of, read_png, succeeds};
+use super::common::{PROGRAM, Png, fails, message_of, read_png, real_files, succeeds};
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, Field};
 use splat_io::srgb::linear_from_srgb8;
 use splat_io::{PlyEncoding, write_ply};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -162,37 +162,6 @@ fn info_tells_columns_fields_and_assumptions() {
     let guessed = info("a.txt")["assumptions"].to_string();
     assert!(guessed.contains("taken as x y z intensity"), "{guessed}");
     assert!(fails(folder.path(), "info a.txt --columns x,y", 2).contains("x, y and z"));
-}
-
-/// The folder of real files, if there is one.
-fn real_files() -> Option<PathBuf> {
-    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
-}
-
-#[test]
-fn real_clouds_are_rendered_or_refused_and_never_a_panic() {
-    let Some(data) = real_files() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let output = folder.path().join("out.png");
-    let files = ["clouds", "tricky_las", "tricky_text"].map(|name| fs::read_dir(data.join(name)).unwrap());
-    for entry in files.into_iter().flatten() {
-        let path = entry.unwrap().path();
-        let run = Command::new(PROGRAM)
-            .args(["render", "--size", "64x48", "--spp", "4", "-o"])
-            .args([&output, &path])
-            .output()
-            .unwrap();
-        let message = message_of(&run);
-        match run.status.code() {
-            Some(0) => fs::remove_file(&output).unwrap(),
-            Some(1) => {
-                let name = path.file_name().unwrap().to_string_lossy();
-                assert!(message.contains(&*name) && !output.exists(), "{message}");
-                assert!(!message.contains("panicked"), "{message}");
-            }
-            code => panic!("{}: {code:?}: {message}", path.display()),
-        }
-    }
 }
 
 /// The octree has the points in another order.

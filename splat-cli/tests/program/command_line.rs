@@ -1,11 +1,11 @@
 //! The program from outside: exit codes, files, messages.
 
-use super::common::{PROGRAM, Png, fails, message_of, read_png, succeeds};
+use super::common::{PROGRAM, Png, fails, message_of, read_png, real_files, succeeds};
 use glam::{DMat4, DVec2, DVec3};
 use splat_core::{Camera, Cloud, Projection, Shapes};
 use splat_io::{PlyEncoding, write_camera_json, write_ply};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -402,18 +402,14 @@ fn meshes_that_cannot_be_converted_say_why() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "nothing is left behind");
 }
 
-/// The folder of real files, if there is one.
-fn real_files() -> Option<PathBuf> {
-    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
-}
-
 #[test]
 fn real_files_are_rendered_or_refused_and_never_a_panic() {
     let Some(data) = real_files() else { return };
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.png");
-    let folders = ["tricky_ply", "splats"].map(|name| fs::read_dir(data.join(name)).unwrap());
-    for entry in folders.into_iter().flatten() {
+    let folders = ["clouds", "splats", "tricky_las", "tricky_ply", "tricky_text"];
+    let files = folders.map(|name| fs::read_dir(data.join(name)).unwrap());
+    for entry in files.into_iter().flatten() {
         let path = entry.unwrap().path();
         let run = Command::new(PROGRAM)
             .args(["render", "--size", "64x48", "--spp", "4", "-o"])

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_splat");
@@ -29,6 +29,11 @@ pub fn fails(folder: &Path, arguments: &str, code: i32) -> String {
 /// What a run said to its user.
 pub fn message_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The folder of real files, if there is one.
+pub fn real_files() -> Option<PathBuf> {
+    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
 }
 
 /// A decoded PNG file.

@@ -131,6 +131,8 @@ fn what_cannot_be_compared_is_said() {
     assert!(message.contains("4x3 pixels") && message.contains("4x2"), "{message}");
     let message = fails(folder, "diff a.exr moved.exr", 2);
     assert!(message.contains("from 2,1 on") && message.contains("3,1"), "{message}");
+    let message = fails(folder, "diff a.exr a.exr --channels R,Q", 2);
+    assert!(message.contains("--channels Q: ") && message.contains("no such channel in common"), "{message}");
     let bytes = fs::read(folder.join("a.exr")).unwrap();
     for length in [0, 3, 100, bytes.len() / 2, bytes.len() - 1] {
         fs::write(folder.join("broken.exr"), &bytes[..length]).unwrap();

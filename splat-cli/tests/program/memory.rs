@@ -125,6 +125,12 @@ const CASES: &[Case] = &[
         command: "render in.ply -o out.exr --size 1500x1000 --spp 1 --aov all --exr-compression none --threads 2",
         limits: &[64, 200, 900],
     },
+    // Of a part of the samples there are sums, too.
+    Case {
+        make: |folder| write_ply(&folder.join("in.ply"), &sheet(20), PlyEncoding::Binary).unwrap(),
+        command: "render in.ply -o out.exr --size 1000x600 --spp 2 --samples 0:1 --aov all --exr-compression none",
+        limits: &[64, 120, 900],
+    },
     Case {
         make: |folder| write_ply(&folder.join("in.ply"), &pile(1200), PlyEncoding::Binary).unwrap(),
         command: "render in.ply -o out.png --size 64x64 --spp 16 --threads 1 --resolve over",

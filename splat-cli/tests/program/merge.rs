@@ -178,6 +178,8 @@ fn what_would_leave_gaps_or_overlap_is_refused() {
         let message = fails(folder, &format!("merge {pieces} -o out.exr"), 1);
         assert!(message.contains(expected), "{pieces}: {message}");
     }
+    let message = fails(folder, "merge left.exr right.exr --crop 0,0,49,36 -o out.exr", 2);
+    assert!(message.contains("--crop reaches beyond the frame of 48x36 pixels"), "{message}");
     assert!(!folder.join("out.exr").exists());
     succeeds(folder, "merge early.exr rest.exr -o out.exr");
     succeeds(folder, "merge left.exr right.exr -o out.exr");

@@ -2,9 +2,8 @@
 //!
 //! The files are in the folder that `SPLAT_TEST_DATA` names; without it nothing is tested.
 
-use super::common::{fails, read_png, succeeds};
+use super::common::{fails, read_png, real_files, succeeds};
 use serde_json::Value;
-use std::path::PathBuf;
 
 /// A cloud: its file, number of points, and bounds.
 type Fact = (&'static str, u64, Option<[[f64; 3]; 2]>);
@@ -69,14 +68,9 @@ const CLOUDS: [Fact; 26] = [
 const REFUSED: [(&str, &str); 3] =
     [("clouds/A4.e57", "E57"), ("splats/minimal.ksplat", "ksplat"), ("tricky_text/missingheader.pcd", "PCD")];
 
-/// The folder of real files, if there is one.
-fn data() -> Option<PathBuf> {
-    std::env::var_os("SPLAT_TEST_DATA").map(PathBuf::from).filter(|folder| folder.is_dir())
-}
-
 #[test]
 fn counts_and_bounds_are_those_that_another_program_found() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_files() else { return };
     for (file, count, bounds) in CLOUDS {
         let output = succeeds(&data, &format!("info --json {file}"));
         let info: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -96,7 +90,7 @@ fn counts_and_bounds_are_those_that_another_program_found() {
 
 #[test]
 fn every_file_becomes_a_picture_without_any_option() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_files() else { return };
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("out.png");
     let mesh = ("meshes/spot/spot_triangulated.obj", 0, None);
@@ -110,7 +104,7 @@ fn every_file_becomes_a_picture_without_any_option() {
 
 #[test]
 fn what_cannot_be_read_is_refused_with_a_reason() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_files() else { return };
     for (file, reason) in REFUSED {
         let message = fails(&data, &format!("info {file}"), 1);
         assert!(message.contains(file) && message.contains(reason), "{message}");
@@ -119,7 +113,7 @@ fn what_cannot_be_read_is_refused_with_a_reason() {
 
 #[test]
 fn twins_give_the_same_image_bits() {
-    let Some(data) = data() else { return };
+    let Some(data) = real_files() else { return };
     let folder = tempfile::tempdir().unwrap();
     let pixels = |file: &str, options: &str| {
         let picture = folder.path().join("out.exr");

@@ -1,6 +1,6 @@
 //! Scene files from outside: what they say is drawn, the command line wins, and what is wrong is said with its line.
 
-use super::common::{Png, message_of, read_png, splat, succeeds};
+use super::common::{Png, fails, message_of, read_png, splat, succeeds};
 use glam::{DVec3, Vec3};
 use splat_core::{Cloud, Shapes};
 use splat_io::{PlyEncoding, write_ply};
@@ -173,4 +173,44 @@ fn clouds_that_convert_cannot_join_are_refused_not_guessed() {
     assert!(said.contains("normals") && !said.contains("panicked"), "{said}");
     // To draw them is no matter: each is completed first.
     picture(folder, &format!("ellipses.ply bare.xyz {SMALL}"));
+}
+
+#[test]
+fn no_file_that_is_read_is_written() {
+    let folder = folder();
+    let folder = folder.path();
+    let scene = "[[cloud]]\npath = \"red.ply\"\ntexture = \"image.png\"\nmapping = \"planar\"\n";
+    fs::write(folder.join("scene.toml"), scene).unwrap();
+    let options = "--size 8x8 --spp 1";
+    succeeds(folder, &format!("render red.ply -o image.png {options}"));
+    for (from, to) in
+        [("image.png", "turn-0001.png"), ("red.ply", "out.png.checkpoint"), ("red.ply", "out.id.exr")]
+    {
+        fs::copy(folder.join(from), folder.join(to)).unwrap();
+    }
+    let contents = || {
+        let read = |entry: std::io::Result<fs::DirEntry>| {
+            let path = entry.unwrap().path();
+            (fs::read(&path).unwrap(), path)
+        };
+        let mut files: Vec<_> = fs::read_dir(folder).unwrap().map(read).collect();
+        files.sort();
+        files
+    };
+    let before = contents();
+    for (command, spared) in [
+        ("render scene.toml -o image.png", "image.png"),
+        ("render scene.toml -o out.png --stats red.ply", "red.ply"),
+        ("render scene.toml -o out.png --stats scene.toml", "scene.toml"),
+        (
+            "render red.ply --texture turn-0001.png --mapping planar --turntable 2 -o turn.png",
+            "turn-0001.png",
+        ),
+        ("render out.png.checkpoint -o out.png", "out.png.checkpoint"),
+        ("render out.id.exr -o out.png --aov id --aov-files", "out.id.exr"),
+    ] {
+        let message = fails(folder, &format!("{command} {options}"), 2);
+        assert!(message.contains(&format!("would overwrite {spared}")), "{command}: {message}");
+        assert!(contents() == before, "{command}");
+    }
 }
