@@ -127,12 +127,26 @@ impl<'a> PixelResolver<'a> {
     /// Adds the next samples, already resolved; enough where no AOV is wanted but variance, coverage and samples.
     #[inline(always)]
     pub fn add_colors(&mut self, samples: impl Iterator<Item = SampleColor>) {
-        let (mut sums, mut count) = (self.sums, self.samples);
-        for sample in samples {
-            count += 1;
-            sums.add(&sample, &self.aovs);
+        if self.aovs.variance || self.aovs.coverage {
+            let (mut sums, mut count) = (self.sums, self.samples);
+            for sample in samples {
+                count += 1;
+                sums.add(&sample, &self.aovs);
+            }
+            (self.sums, self.samples) = (sums, count);
+        } else {
+            // So it nearly always is: the few sums that it needs stay in registers.
+            let Sums { mut color, mut transmittance, .. } = self.sums;
+            let mut count = self.samples;
+            for sample in samples {
+                count += 1;
+                for (sum, value) in color.iter_mut().zip(sample.color) {
+                    *sum += f64::from(value);
+                }
+                transmittance += f64::from(sample.transmittance);
+            }
+            (self.sums.color, self.sums.transmittance, self.samples) = (color, transmittance, count);
         }
-        (self.sums, self.samples) = (sums, count);
     }
 
     /// A film of which every pixel is as one without fragments, with this many samples each.

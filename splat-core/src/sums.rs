@@ -89,6 +89,7 @@ impl Sums {
     }
 
     /// Writes the means over `samples` samples to a pixel of the film; all but its id.
+    #[inline(always)]
     pub fn finish(&self, samples: u32, ending: &Ending, index: usize, film: &mut Film) {
         let n = f64::from(samples);
         film.rgba[index] = ending.color(self.color.map(|sum| sum / n), self.transmittance / n);
@@ -101,7 +102,10 @@ impl Sums {
         set(&mut film.coverage, index, (1.0 - self.uncovered / n) as f32);
         set(&mut film.layers, index, (self.layers / n) as f32);
         set(&mut film.samples, index, samples as f32);
-        set(&mut film.variance, index, self.variance_of_the_mean(n));
+        if let Some(variance) = &mut film.variance {
+            // It takes longer than all the rest.
+            variance[index] = self.variance_of_the_mean(n);
+        }
         if let Some(sums) = &mut film.sums {
             sums.set(index, *self);
         }

@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellNumber, Lattice};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
-use crate::raster::{LatticeJob, RasterFrame, RasterJob};
+use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
 use crate::render::set_up;
 use crate::samples::{DistortedSamples, LaneSamples};
@@ -74,9 +74,15 @@ impl<'a> SplatBySplat<'a> {
         let ranks = &[rank as u32];
         let tests = match (method, &self.lattice) {
             (Method::LensPoints, Some(lattice)) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+                let images = &[lattice.image(&self.frame.set_up.splats[rank])];
+                let target = Target::Records;
+                let job = LatticeJob { frame, lattice, ranks, images, region, records, cells, target };
+                self.level.run_single(job)
             }
-            _ => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
+            _ => {
+                let target = Target::Records;
+                self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target })
+            }
         };
         self.records.group();
         tests

@@ -51,6 +51,8 @@ pub struct Lattice {
     boxes: Vec<[Eight; 4]>,
     /// Block by block, of each group.
     cells: Vec<Cell>,
+    /// The same: where in the tile the samples are, to rounding.
+    positions: Vec<[Eight; 2]>,
     /// The same: place and number (from the first that is taken) of each sample.
     samples: Vec<[(u16, u32); LANES]>,
     /// For each place, the cell and the lane of each of its samples.
@@ -88,6 +90,7 @@ impl Lattice {
             group_size: mean_size(&boxes),
             boxes,
             cells: Vec::new(),
+            positions: Vec::new(),
             samples: Vec::new(),
             cell_of: vec![(0, 0); PLACES * range.len()],
             count: range.len(),
@@ -121,10 +124,13 @@ impl Lattice {
                 table.jitter(x, y)[group[lane].sample][axis]
             };
             let number = self.cells.len() as u32;
-            self.cells.push(Cell {
+            let cell = Cell {
                 pixel: [0, 1].map(|axis| pixels.map(|pixel| pixel[axis] as f32)),
                 jitter: [0, 1].map(|axis| std::array::from_fn(|lane| jitter(lane, axis))),
-            });
+            };
+            let position = |axis: usize, lane: usize| cell.pixel[axis][lane] + cell.jitter[axis][lane];
+            self.positions.push([0, 1].map(|axis| std::array::from_fn(|lane| position(axis, lane))));
+            self.cells.push(cell);
             let samples = std::array::from_fn(|lane| {
                 let [x, y] = pixels[lane];
                 (place_of(x, y), (group[lane].sample - first) as u32)
@@ -154,8 +160,8 @@ impl Lattice {
     }
 
     /// Whether a splat has less to test here than pixel by pixel, by an estimate; and by how many cells.
-    pub fn gain(&self, splat: &VisibleSplat, region: &PixelRect) -> f64 {
-        let Some(image) = self.image(splat) else { return 0.0 };
+    pub fn gain(&self, splat: &VisibleSplat, image: Option<&Image>, region: &PixelRect) -> f64 {
+        let Some(image) = image else { return 0.0 };
         let blur = self.lens_radius * image.defocus.map(f64::abs).into_iter().fold(0.0, f64::max);
         let [width, height] = [0, 1].map(|axis| image.max[axis] - image.min[axis] + 2.0 * self.filter_radius);
         let share = splat.bounds.intersect(region).area() as f64 / splat.bounds.area() as f64;
@@ -169,7 +175,7 @@ impl Lattice {
     }
 
     /// What a pinhole sees of a splat, and how far its depths are out of focus. `None` if that is not known.
-    fn image(&self, splat: &VisibleSplat) -> Option<Image> {
+    pub fn image(&self, splat: &VisibleSplat) -> Option<Image> {
         if !splat.outline.is_known() {
             return None;
         }
@@ -204,16 +210,22 @@ impl Lattice {
 
     /// Lists the cells of a tile (given by its first pixel) in which a splat may be hit.
     #[inline(always)]
-    pub fn list<L: Lanes>(&self, splat: &VisibleSplat, corner: [i32; 2], list: &mut Vec<CellNumber>) {
+    pub fn list<L: Lanes>(
+        &self,
+        splat: &VisibleSplat,
+        image: Option<&Image>,
+        corner: [i32; 2],
+        list: &mut Vec<CellNumber>,
+    ) {
         list.clear();
         let groups = self.lens.len() as u32;
-        let Some(image) = self.image(splat) else {
+        let Some(image) = image else {
             let blocks = 0..(BLOCKS * BLOCKS) as u32;
             let cells = blocks.flat_map(|block| (0..groups).map(move |group| (block * groups, group)));
             list.extend(cells.map(|(first, group)| CellNumber { cell: first + group, group }));
             return;
         };
-        let [x, y] = [0, 1].map(|axis| self.reach(&image, axis, splat, corner));
+        let [x, y] = [0, 1].map(|axis| self.reach(image, axis, splat, corner));
         for (eight, boxes) in self.boxes.iter().enumerate() {
             // Bit l + 8 b is set where the box of group l reaches block b of a row, or of a column.
             let columns = x.blocks::<L>(&boxes[0], &boxes[1]);
@@ -234,6 +246,40 @@ impl Lattice {
                 }
             }
         }
+        let near = [0, 1].map(|axis| self.nearness(image, axis, splat, corner));
+        self.keep_near::<L>(&near, list);
+    }
+
+    /// Keeps those of some cells of which a sample is near a splat.
+    #[inline(always)]
+    fn keep_near<L: Lanes>(&self, [x, y]: &[Nearness; 2], list: &mut Vec<CellNumber>) {
+        let mut kept = 0;
+        for i in 0..list.len() {
+            let number = list[i];
+            let (position, lens) = (&self.positions[number.cell as usize], &self.lens[number.group as usize]);
+            let far = x.is_far(L::load(&position[0]), L::load(&lens[0]))
+                | y.is_far(L::load(&position[1]), L::load(&lens[1]));
+            // Written in any case: which is kept cannot be foreseen.
+            list[kept] = number;
+            kept += usize::from(far.bits() as u8 != u8::MAX);
+        }
+        list.truncate(kept);
+    }
+
+    /// Where along an axis the samples are by which a splat may be hit.
+    #[inline(always)]
+    fn nearness(&self, image: &Image, axis: usize, splat: &VisibleSplat, corner: [i32; 2]) -> Nearness {
+        let center = [splat.constants.xi, splat.constants.yi];
+        let origin = f64::from(center[axis]) - f64::from(corner[axis]);
+        let [near, far] = image.defocus;
+        let defocus = 0.5 * (near + far);
+        let spread = self.lens_radius * 0.5 * (near - far).abs();
+        let [middle, half] =
+            [0.5 * (image.max[axis] + image.min[axis]) + origin, 0.5 * (image.max[axis] - image.min[axis])];
+        // Three roundings of terms that may cancel.
+        let rounding =
+            (middle.abs() + self.lens_radius * defocus.abs() + 64.0) * 4.0 * f64::from(f32::EPSILON);
+        Nearness { middle: middle as f32, half: (half + spread + rounding) as f32, defocus: defocus as f32 }
     }
 
     /// How far a splat reaches along an axis, for [`Reach::blocks`].
@@ -313,8 +359,9 @@ impl<L: Lanes> Apart<L> {
     }
 }
 
-/// What a pinhole sees of a splat, in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
-struct Image {
+/// What a pinhole sees of a splat, for [`Lattice`]: in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
+#[derive(Debug, Clone, Copy)]
+pub struct Image {
     min: [f64; 2],
     max: [f64; 2],
     defocus: [f64; 2],
@@ -328,6 +375,22 @@ struct Reach {
     /// 1/focus - 1/w, times blocks a pixel: the middle of its range, and half of its length.
     defocus: f32,
     spread: f32,
+}
+
+/// What is near a splat along an axis: samples within `half` of `middle` plus lens point times `defocus`, in pixels from the
+/// tile's first.
+struct Nearness {
+    middle: f32,
+    half: f32,
+    defocus: f32,
+}
+
+impl Nearness {
+    #[inline(always)]
+    fn is_far<L: Lanes>(&self, position: L, lens: L) -> L {
+        let offset = (position - L::splat(self.middle)) - lens * L::splat(self.defocus);
+        L::splat(self.half).less(offset.greatest(L::splat(0.0) - offset))
+    }
 }
 
 impl Reach {

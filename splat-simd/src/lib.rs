@@ -16,6 +16,7 @@ mod render;
 mod resolve;
 mod samples;
 mod shade;
+mod surface_sums;
 pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};

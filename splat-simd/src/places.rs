@@ -49,6 +49,18 @@ impl PlaceList {
         &self.places[..self.count]
     }
 
+    /// Keeps some of the places, in their order.
+    #[inline(always)]
+    pub fn retain(&mut self, keeps: impl Fn(u16) -> bool) {
+        let mut kept = 0;
+        for i in 0..self.count {
+            let place = self.places[i];
+            self.places[kept] = place;
+            kept += usize::from(keeps(place));
+        }
+        self.count = kept;
+    }
+
     /// (x - xi, y - yi) of a place, as the reference has it.
     #[inline(always)]
     pub fn offset(&self, place: u16) -> [f32; 2] {

@@ -2,10 +2,11 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
-use crate::lattice::{Apart, CellNumber, Lattice};
+use crate::lattice::{Apart, CellNumber, Image, Lattice};
 use crate::places::{PLACES, PlaceList, TILE};
-use crate::records::{Page, Record, RecordBuffer};
+use crate::records::{Key, Page, Record, RecordBuffer, cell_of};
 use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
+use crate::surface_sums::SurfaceSums;
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
 use splat_core::kernel::{KernelTable, Polynomials};
@@ -46,6 +47,19 @@ pub struct RasterJob<'a> {
     pub places: &'a mut PlaceList,
     /// The positions of the region's samples, if the lens distorts.
     pub distorted: &'a DistortedSamples,
+    /// What becomes of the fragments.
+    pub target: Target<'a>,
+}
+
+/// What becomes of the fragments of a region.
+#[derive(Debug)]
+pub enum Target<'a> {
+    /// They stay in the record buffer.
+    Records,
+    /// They are summed, and the buffer forgets them.
+    Sums(&'a mut SurfaceSums),
+    /// Those of the layered cells of these sums stay in the record buffer.
+    Layered(&'a SurfaceSums),
 }
 
 impl Kernel for RasterJob<'_> {
@@ -103,7 +117,7 @@ impl RasterJob<'_> {
 
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable, const FORM: u8>(self, table: &T) -> u64 {
-        let Self { frame, ranks, region, records, places, distorted } = self;
+        let Self { frame, ranks, region, records, places, distorted, mut target } = self;
         let mut tests = 0;
         for (i, &rank) in ranks.iter().enumerate() {
             if let Some(&next) = ranks.get(i + AHEAD) {
@@ -112,16 +126,21 @@ impl RasterJob<'_> {
             }
             let splat = &frame.splats[rank as usize];
             places.fill::<L>(splat, &region, frame.filter_radius);
+            if let Target::Layered(sums) = &target {
+                places.retain(|place| sums.is_layered(cell_of(place, 0)));
+            }
             let cells = places.places().len() * frame.samples.groups();
-            let Some(page) = records.begin(rank, &frame.surfaces[rank as usize], cells) else { break };
+            let surface = &frame.surfaces[rank as usize];
+            let Some(mut page) = records.begin(rank, surface, cells) else { break };
             tests += (places.places().len() * frame.samples.samples()) as u64;
             let splat = Evaluation::<L, T>::new(&frame, splat, table);
             // With distortion none is plain.
             if splat.splat.plain && !is_distorted(FORM) {
-                splat.rasterize::<FORM, true>(places, distorted, page);
+                splat.rasterize::<FORM, true>(places, distorted, &mut page);
             } else {
-                splat.rasterize::<FORM, false>(places, distorted, page);
+                splat.rasterize::<FORM, false>(places, distorted, &mut page);
             }
+            splat.finish(page, surface, &mut target);
         }
         tests
     }
@@ -136,12 +155,16 @@ pub struct LatticeJob<'a> {
     pub lattice: &'a Lattice,
     /// As [`RasterJob::ranks`].
     pub ranks: &'a [u32],
+    /// The image of each of these splats, as [`Lattice::image`] has it.
+    pub images: &'a [Option<Image>],
     /// The pixels; they lie within one tile.
     pub region: PixelRect,
     /// Where the fragments go.
     pub records: &'a mut RecordBuffer,
     /// Scratch.
     pub cells: &'a mut Vec<CellNumber>,
+    /// As [`RasterJob::target`].
+    pub target: Target<'a>,
 }
 
 impl Kernel for LatticeJob<'_> {
@@ -164,26 +187,31 @@ impl Kernel for LatticeJob<'_> {
 impl LatticeJob<'_> {
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
-        let Self { frame, lattice, ranks, region, records, cells } = self;
+        let Self { frame, lattice, ranks, images, region, records, cells, mut target } = self;
         let corner = [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)];
         let partial = region.area() < PLACES;
         let mut tests = 0;
-        for (i, &rank) in ranks.iter().enumerate() {
+        for (i, (&rank, image)) in ranks.iter().zip(images).enumerate() {
             if let Some(&next) = ranks.get(i + AHEAD) {
                 prefetch(&frame.splats[next as usize]);
                 prefetch(&frame.surfaces[next as usize]);
             }
             let splat = &frame.splats[rank as usize];
-            lattice.list::<L>(splat, corner, cells);
-            let Some(page) = records.begin(rank, &frame.surfaces[rank as usize], cells.len()) else { break };
+            lattice.list::<L>(splat, image.as_ref(), corner, cells);
+            if let Target::Layered(sums) = &target {
+                cells.retain(|number| sums.is_layered(number.cell as usize));
+            }
+            let surface = &frame.surfaces[rank as usize];
+            let Some(mut page) = records.begin(rank, surface, cells.len()) else { break };
             tests += (cells.len() * LANES) as u64;
             let clip = partial.then_some(&region);
             let splat = Evaluation::<L, T>::new(&frame, splat, table);
             if splat.splat.plain {
-                splat.rasterize_cells::<true>(lattice, cells, corner, clip, page);
+                splat.rasterize_cells::<true>(lattice, cells, corner, clip, &mut page);
             } else {
-                splat.rasterize_cells::<false>(lattice, cells, corner, clip, page);
+                splat.rasterize_cells::<false>(lattice, cells, corner, clip, &mut page);
             }
+            splat.finish(page, surface, &mut target);
         }
         tests
     }
@@ -223,24 +251,22 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         &self,
         list: &PlaceList,
         distorted: &DistortedSamples,
-        mut page: Page<'_>,
+        page: &mut Page<'_>,
     ) {
         let back = self.splat.back;
         if has_lens(FORM) && self.splat.flips {
             // Once for each side: few splats stand so that the lens sees both.
             if !(self.culls && back) {
-                self.side::<FORM, PLAIN, true, SAME_SIDE>(list, distorted, &mut page, back);
+                self.side::<FORM, PLAIN, true, SAME_SIDE>(list, distorted, page, back);
             }
             if back || !self.culls {
-                self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, distorted, &mut page, !back);
+                self.side::<FORM, PLAIN, true, OTHER_SIDE>(list, distorted, page, !back);
             }
         } else if has_lens(FORM) && !(self.culls && back) {
-            self.side::<FORM, PLAIN, true, ANY_SIDE>(list, distorted, &mut page, back);
+            self.side::<FORM, PLAIN, true, ANY_SIDE>(list, distorted, page, back);
         } else if !has_lens(FORM) {
-            self.side::<FORM, PLAIN, false, ANY_SIDE>(list, distorted, &mut page, back);
+            self.side::<FORM, PLAIN, false, ANY_SIDE>(list, distorted, page, back);
         }
-        let fragments = self.weigh(page.records());
-        page.close(fragments);
     }
 
     /// Tests the samples of a list of cells of a tile, given by its first pixel; of the pixels of `clip` alone, if given.
@@ -251,7 +277,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         cells: &[CellNumber],
         corner: [i32; 2],
         clip: Option<&PixelRect>,
-        mut page: Page<'_>,
+        page: &mut Page<'_>,
     ) {
         let apart = Apart::new(self.splat, corner);
         let ordinary = clip.is_none() && !self.splat.flips && matches!(apart, Apart::Near(_));
@@ -268,11 +294,9 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
                 if let Some(region) = clip {
                     lattice.clip(number.cell, corner, region, &mut hits);
                 }
-                self.put_sides(number.cell, hits, &mut page);
+                self.put_sides(number.cell, hits, page);
             }
         }
-        let fragments = self.weigh(page.records());
-        page.close(fragments);
     }
 
     /// The hits in a cell of a lattice.
@@ -303,15 +327,76 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         }
     }
 
+    /// Makes fragments of the hits of a page.
+    #[inline(always)]
+    fn finish(&self, mut page: Page<'_>, surface: &SplatSurface, target: &mut Target<'_>) {
+        let fragments = match target {
+            Target::Sums(sums) => self.sum(&page, surface, sums),
+            Target::Records | Target::Layered(_) => self.weigh(page.records()),
+        };
+        page.close(fragments);
+    }
+
+    /// Adds the hits of a page to the sums of their cells. Returns the number of fragments.
+    #[inline(always)]
+    fn sum(&self, page: &Page<'_>, surface: &SplatSurface, sums: &mut SurfaceSums) -> u32 {
+        let (records, keys) = page.records_and_keys();
+        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
+        let (pairs, last) = records.as_chunks::<2>();
+        let (pair_keys, last_key) = keys.as_chunks::<2>();
+        for ([first, second], keys) in pairs.iter().zip(pair_keys) {
+            let [a, b] = keys.map(Key::list);
+            if L::CELLS == 2 {
+                self.sum_cells([first, second], [a, b], surface, sums, &mut misses);
+            } else {
+                self.sum_cells([first; 2], [a; 2], surface, sums, &mut misses);
+                self.sum_cells([second; 2], [b; 2], surface, sums, &mut misses);
+            }
+        }
+        if let ([record], [key]) = (last, last_key) {
+            self.sum_cells([record; 2], [key.list(); 2], surface, sums, &mut last_misses);
+        }
+        Self::count_hits(records.len(), misses, last_misses)
+    }
+
+    /// [`Self::sum`] for one record (given twice), or for two.
+    #[inline(always)]
+    fn sum_cells(
+        &self,
+        [first, second]: [&Record; 2],
+        cells: [usize; 2],
+        surface: &SplatSurface,
+        sums: &mut SurfaceSums,
+        misses: &mut L,
+    ) {
+        let depth = L::load_cells(&first.depth, &second.depth);
+        let r2 = L::load_cells(&first.weight, &second.weight);
+        let (depth, weight) = self.weighed(depth, r2, misses);
+        sums.add(cells, depth, weight, surface);
+    }
+
+    /// The number of hits in some records, given the misses in each lane: in pairs of records, and in the last one, of which
+    /// the first cell counts. Exact as long as a splat has fewer than 2^24 records.
+    #[inline(always)]
+    fn count_hits(records: usize, misses: L, last_misses: L) -> u32 {
+        let mut counts = [[0.0; LANES]; 3];
+        misses.store_cell::<0>(&mut counts[0]);
+        if L::CELLS == 2 {
+            misses.store_cell::<1>(&mut counts[1]);
+        }
+        last_misses.store_cell::<0>(&mut counts[2]);
+        let counts: Eight = std::array::from_fn(|lane| counts[0][lane] + counts[1][lane] + counts[2][lane]);
+        (records * LANES) as u32 - counts.iter().sum::<f32>() as u32
+    }
+
     /// Turns the r2 of some records into weights, and drops what weighs nothing. Returns the number of fragments left.
     ///
     /// Not at once where the hits are found: this way neither loop is so long that the processor sees only one cell of it
     /// at a time.
     #[inline(always)]
     fn weigh(&self, records: &mut [Record]) -> u32 {
-        let count = records.len() * LANES;
-        // Of each lane, exact as long as a splat has fewer than 2^24 records.
-        let mut misses = L::splat(0.0);
+        let count = records.len();
+        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks_mut::<2>();
         if L::CELLS == 2 {
             for [first, second] in pairs {
@@ -329,19 +414,10 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
                 self.weigh_one(second, &mut misses);
             }
         }
-        let mut sums = [[0.0; LANES]; 2];
-        misses.store_cell::<0>(&mut sums[0]);
-        if L::CELLS == 2 {
-            misses.store_cell::<1>(&mut sums[1]);
-        }
         if let [record] = last {
-            let mut misses = L::splat(0.0);
-            self.weigh_one(record, &mut misses);
-            let mut last = [0.0; LANES];
-            misses.store_cell::<0>(&mut last);
-            sums[0] = std::array::from_fn(|lane| sums[0][lane] + last[lane]);
+            self.weigh_one(record, &mut last_misses);
         }
-        (count as u32) - sums.as_flattened().iter().sum::<f32>() as u32
+        Self::count_hits(count, misses, last_misses)
     }
 
     /// [`Self::weigh`] for one record.

@@ -18,7 +18,7 @@ pub struct Record {
 
 /// The list that a record belongs to in the lower half, and its splat in the upper.
 #[derive(Debug, Clone, Copy, Default)]
-struct Key(u64);
+pub struct Key(u64);
 
 impl Key {
     #[inline(always)]
@@ -26,8 +26,9 @@ impl Key {
         Self(u64::from(splat.0) << 32 | u64::from(list))
     }
 
+    /// The list.
     #[inline(always)]
-    fn list(self) -> usize {
+    pub fn list(self) -> usize {
         self.0 as u32 as usize
     }
 
@@ -90,7 +91,7 @@ pub struct RecordBuffer {
     groups: usize,
     /// One list a cell, or one for fronts and one for backs.
     sides: usize,
-    /// For each side, group and place the number of its records; then, grouped, where its entries end.
+    /// For each side, group and place where its entries end, once they are grouped.
     lists: Vec<[u32; PLACES]>,
     entries: Vec<Entry>,
     /// The buffer takes no new splat when it holds more records than this.
@@ -152,7 +153,6 @@ impl RecordBuffer {
             sides: self.sides,
             records: &mut self.records,
             keys: &mut self.keys,
-            lists: &mut self.lists,
             first: self.count,
             count: self.count,
             totals: (&mut self.count, &mut self.fragments),
@@ -168,6 +168,9 @@ impl RecordBuffer {
     pub fn group(&mut self) {
         let mut start = 0;
         let lists = self.lists.as_flattened_mut();
+        for key in &self.keys[..self.count] {
+            lists[key.list()] += 1;
+        }
         for end in &mut *lists {
             start += std::mem::replace(end, start);
         }
@@ -244,7 +247,6 @@ impl RecordBuffer {
 pub struct Page<'a> {
     records: &'a mut [Record],
     keys: &'a mut [Key],
-    lists: &'a mut [[u32; PLACES]],
     number: u32,
     groups: usize,
     sides: usize,
@@ -259,8 +261,6 @@ pub struct Page<'a> {
 pub struct Column<'a> {
     records: &'a mut [Record],
     keys: &'a mut [Key],
-    /// The number of records of each place's list.
-    counts: &'a mut [u32; PLACES],
     /// Key of place 0.
     key: Key,
     count: usize,
@@ -277,7 +277,6 @@ impl Page<'_> {
         Column {
             keys: &mut self.keys[room.clone()],
             records: &mut self.records[room],
-            counts: &mut self.lists[list],
             key: Key::new((list * PLACES) as u32, LocalSplat::new(self.number, back)),
             count: 0,
             total: &mut self.count,
@@ -292,15 +291,20 @@ impl Page<'_> {
         (hits.depth | hits.missed).store_cell::<0>(&mut record.depth);
         hits.r2.store_cell::<0>(&mut record.weight);
         self.keys[self.count] = Key::new(list as u32, LocalSplat::new(self.number, back));
-        let kept = u32::from(hits.missed.bits() as u8 != u8::MAX);
-        self.lists.as_flattened_mut()[list] += kept;
-        self.count += kept as usize;
+        self.count += usize::from(hits.missed.bits() as u8 != u8::MAX);
     }
 
     /// The records of the page.
     #[inline(always)]
     pub fn records(&mut self) -> &mut [Record] {
         &mut self.records[self.first..self.count]
+    }
+
+    /// The records of the page, and to which list each belongs.
+    #[inline(always)]
+    pub fn records_and_keys(&self) -> (&[Record], &[Key]) {
+        let page = self.first..self.count;
+        (&self.records[page.clone()], &self.keys[page])
     }
 
     /// Ends the splat, which has this many fragments.
@@ -324,9 +328,7 @@ impl Column<'_> {
         hits.r2.store_cell::<CELL>(&mut record.weight);
         self.keys[self.count] = Key(self.key.0 | u64::from(place));
         let misses = (hits.missed.bits() >> (CELL * LANES)) as u8;
-        let kept = if SPARSE { u32::from(misses != u8::MAX) } else { 1 };
-        self.counts[usize::from(place) % PLACES] += kept;
-        self.count += kept as usize;
+        self.count += if SPARSE { usize::from(misses != u8::MAX) } else { 1 };
     }
 
     /// Ends the column.

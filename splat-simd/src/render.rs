@@ -1,14 +1,15 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
 use crate::lanes::{LANES, Level};
-use crate::lattice::{CellNumber, Lattice};
+use crate::lattice::{CellNumber, Image, Lattice};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
-use crate::raster::{LatticeJob, RasterFrame, RasterJob};
+use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
-use crate::resolve::{ResolveCell, ResolveJob, Surfaces};
+use crate::resolve::{ResolveCell, ResolveJob, SummedSurfaces, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
+use crate::surface_sums::{FindLayered, SurfaceSums};
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, SplatSurface, Thickness};
 use splat_core::memory::Budget;
@@ -34,13 +35,20 @@ const SET_UP_PARTS: usize = 16;
 const TILES_A_REPORT: usize = 16;
 
 /// At most so many bytes a sample of a pixel take the buffers of a thread besides the records.
-const WORKER_BYTES: usize = 32 << 10;
+const WORKER_BYTES: usize = (32 << 10) + PLACES * SurfaceSums::BYTES_PER_CELL / LANES;
 
-/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, and what its fragments share.
-const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>());
+/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, what its fragments share, and its image.
+const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>() + size_of::<Option<Image>>());
 
 /// The same for its shader.
 const SHADED_BYTES: usize = 1024;
+
+/// If more of a tile's cells than this hold several layers, sums are not worth their while: such cells are rasterised
+/// twice.
+const MOST_LAYERED: f32 = 0.25;
+
+/// The number of groups of samples up to which the sums of a tile stay in the second cache.
+const MOST_SUMMED: usize = 8;
 
 /// A renderer that keeps its threads and buffers from picture to picture.
 #[derive(Debug)]
@@ -60,10 +68,22 @@ struct Worker {
     records: RecordBuffer,
     places: PlaceList,
     distorted: DistortedSamples,
+    images: Vec<Option<Image>>,
     cells: Vec<CellNumber>,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
     over: Over,
+    sums: SurfaceSums,
+    /// The part of the last tile's cells that held several layers.
+    layered_share: f32,
+}
+
+/// Which fragments of a region are kept, and how: [`Target`] without its buffers.
+#[derive(Debug, Clone, Copy)]
+enum Keep {
+    Records,
+    Sums,
+    Layered,
 }
 
 /// A finished tile.
@@ -352,18 +372,26 @@ impl<'a> Picture<'a> {
         worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
         worker.records.forget();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
-        let lattice = self.lattice_for(region, ranks);
-        let tests = self.rasterize(worker, region, ranks, lattice);
+        let lattice = self.lattice_for(region, ranks, &mut worker.images);
+        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
         let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 
     /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
-    fn lattice_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&Lattice> {
+    fn lattice_for(
+        &self,
+        region: &PixelRect,
+        ranks: &[u32],
+        images: &mut Vec<Option<Image>>,
+    ) -> Option<&Lattice> {
         // A lattice's cells spread over the tile, whatever small part of it is asked for.
         let lattice = self.lattice.as_ref().filter(|_| region.area() >= PLACES / 2)?;
         let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
-        let gain: f64 = splats.map(|splat| lattice.gain(splat, region)).sum();
+        images.clear();
+        images.extend(splats.clone().map(|splat| lattice.image(splat)));
+        let gain: f64 =
+            splats.zip(&*images).map(|(splat, image)| lattice.gain(splat, image.as_ref(), region)).sum();
         (gain > 0.0).then_some(lattice)
     }
 
@@ -374,14 +402,27 @@ impl<'a> Picture<'a> {
         region: &PixelRect,
         ranks: &[u32],
         lattice: Option<&Lattice>,
+        keep: Keep,
     ) -> u64 {
-        let Worker { records, places, distorted, cells, .. } = worker;
+        let Worker { records, places, distorted, images, cells, sums, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
+        let target = match keep {
+            Keep::Records => Target::Records,
+            Keep::Sums => Target::Sums(sums),
+            Keep::Layered => Target::Layered(sums),
+        };
         match lattice {
-            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted }),
-            Some(lattice) => {
-                self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
-            }
+            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target }),
+            Some(lattice) => self.level.run_single(LatticeJob {
+                frame,
+                lattice,
+                ranks,
+                images,
+                region,
+                records,
+                cells,
+                target,
+            }),
         }
     }
 
@@ -407,10 +448,19 @@ impl<'a> Picture<'a> {
             return quarters(region)
                 .try_for_each(|quarter| self.region(worker, &quarter, ranks, pixels, film, statistics));
         }
-        worker.records.clear(self.samples.groups(), self.two_sided(), limit);
-        let lattice = self.lattice_for(region, ranks);
-        let tests = self.rasterize(worker, region, ranks, lattice);
+        let lattice = self.lattice_for(region, ranks, &mut worker.images);
+        let summed = self.can_sum() && worker.layered_share < MOST_LAYERED;
+        let (tests, fragments) = if summed {
+            self.sum_surfaces(worker, region, ranks, lattice, limit)
+        } else {
+            // So that sums are tried again in a while.
+            worker.layered_share *= 0.9;
+            worker.records.clear(self.samples.groups(), self.two_sided(), limit);
+            let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
+            (tests, worker.records.fragments)
+        };
         if !worker.records.is_complete() {
+            worker.sums.clear();
             statistics.raster += start.elapsed();
             if region.area() == 1 {
                 let bytes = RecordBuffer::BYTES_PER_RECORD;
@@ -422,9 +472,15 @@ impl<'a> Picture<'a> {
         worker.records.group();
         statistics.raster += start.elapsed();
         statistics.tests += tests;
-        statistics.fragments += worker.records.fragments;
+        statistics.fragments += fragments;
         let start = Instant::now();
         match self.options.resolve {
+            Resolve::Surface { coverage, .. } if summed => {
+                let mut sums = std::mem::take(&mut worker.sums);
+                let mut cells = SummedSurfaces { coverage, sums: &mut sums };
+                self.resolve_cells(worker, region, lattice, &mut cells, pixels, film);
+                worker.sums = sums;
+            }
             Resolve::Surface { coverage, thickness: Thickness::AroundHit } if few(self.options.aovs) => {
                 if self.cloud.opacities.is_none() {
                     self.resolve_cells(
@@ -455,6 +511,42 @@ impl<'a> Picture<'a> {
         }
         statistics.resolve += start.elapsed();
         Ok(())
+    }
+
+    /// Makes the fragments of a region: sums where a cell holds one layer, and records for the others. Returns the
+    /// number of samples tested and that of fragments.
+    fn sum_surfaces(
+        &self,
+        worker: &mut Worker,
+        region: &PixelRect,
+        ranks: &[u32],
+        lattice: Option<&Lattice>,
+        limit: usize,
+    ) -> (u64, u64) {
+        let groups = self.samples.groups();
+        worker.sums.prepare(groups);
+        worker.records.clear(groups, false, usize::MAX);
+        worker.records.forget();
+        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Sums);
+        let fragments = worker.records.fragments;
+        let [layered, hit] =
+            self.level.run_single(FindLayered { sums: &mut worker.sums, by_pixel: lattice.is_none() });
+        worker.layered_share = layered as f32 / hit.max(1) as f32;
+        worker.records.clear(groups, false, limit);
+        if layered > 0 {
+            self.rasterize(worker, region, ranks, lattice, Keep::Layered);
+        }
+        (tests, fragments)
+    }
+
+    /// Whether the surfaces of a cell may be known by sums alone.
+    fn can_sum(&self) -> bool {
+        matches!(self.options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. })
+            && few(self.options.aovs)
+            && self.cloud.opacities.is_none()
+            && !self.options.material.varies_by_pixel()
+            && !self.two_sided()
+            && self.samples.groups() <= MOST_SUMMED
     }
 
     /// Whether both sides of a splat can be seen, and are not the same to the resolve.

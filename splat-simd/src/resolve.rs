@@ -10,12 +10,18 @@ use crate::places::{PLACES, place_of};
 use crate::records::{Entry, RecordBuffer, cell_of};
 use crate::samples::LaneSamples;
 use crate::shade::TileShader;
+use crate::surface_sums::SurfaceSums;
 use splat_abuffer::{Coverage, MIN_LAYER_WEIGHT, SampleColor, SplatSurface};
 use splat_core::pixel::PixelResolver;
 use splat_core::{Film, PixelRect};
 
 /// What makes the colours of the samples of a cell.
 pub trait ResolveCell {
+    /// Whether a cell has no fragments.
+    fn is_empty(&self, buffer: &RecordBuffer, cell: usize) -> bool {
+        buffer.is_empty(cell)
+    }
+
     /// The colours of the eight samples of a cell.
     fn resolve_cell<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> Colors<L>;
 }
@@ -62,7 +68,7 @@ impl<C: ResolveCell> ResolveJob<'_, '_, '_, C> {
         for y in self.region.y0..self.region.y1 {
             for x in self.region.x0..self.region.x1 {
                 let place = place_of(x, y);
-                if (0..groups).all(|group| self.buffer.is_empty(cell_of(place, group))) {
+                if (0..groups).all(|group| self.cells.is_empty(self.buffer, cell_of(place, group))) {
                     continue;
                 }
                 if let Some(shader) = &mut self.shader {
@@ -86,7 +92,10 @@ impl<C: ResolveCell> ResolveJob<'_, '_, '_, C> {
         let count = self.samples.samples();
         self.scratch.clear();
         self.scratch.resize(PLACES * count, SampleColor::NOTHING);
-        for cell in (0..lattice.cells()).filter(|&cell| !self.buffer.is_empty(cell)) {
+        for cell in 0..lattice.cells() {
+            if self.cells.is_empty(self.buffer, cell) {
+                continue;
+            }
             let colors = self.cells.resolve_cell::<L>(self.buffer, cell).to_arrays();
             for (lane, &(place, sample)) in lattice.samples(cell).iter().enumerate() {
                 self.scratch[usize::from(place) * count + sample as usize] = sample_of(&colors, lane);
@@ -119,6 +128,31 @@ impl<const OPAQUE: bool> ResolveCell for Surfaces<OPAQUE> {
             colors: Colors::nothing(),
         };
         resolver.resolve()
+    }
+}
+
+/// [`Surfaces`] of which most are summed already.
+pub struct SummedSurfaces<'a> {
+    /// How much of a sample a surface covers.
+    pub coverage: Coverage,
+    /// The sums of the cells of one layer.
+    pub sums: &'a mut SurfaceSums,
+}
+
+impl ResolveCell for SummedSurfaces<'_> {
+    #[inline(always)]
+    fn is_empty(&self, buffer: &RecordBuffer, cell: usize) -> bool {
+        self.sums.is_empty(cell) && buffer.is_empty(cell)
+    }
+
+    #[inline(always)]
+    fn resolve_cell<L: Lanes>(&mut self, buffer: &RecordBuffer, cell: usize) -> Colors<L> {
+        if self.sums.is_layered(cell) {
+            return Surfaces::<true> { coverage: self.coverage }.resolve_cell(buffer, cell);
+        }
+        let mut colors = Colors::nothing();
+        colors.composite::<true>(&self.sums.take(cell), self.coverage);
+        colors
     }
 }
 
@@ -187,11 +221,21 @@ impl<L: Lanes> Colors<L> {
     }
 }
 
+/// Near and far end of the intervals of a splat's fragments at these depths; not a number where there is none.
+#[inline(always)]
+pub fn interval<L: Lanes>(depth: L, surface: &SplatSurface) -> [L; 2] {
+    let [slope, cap] = surface.interval;
+    let half = (L::splat(slope) * depth).least(L::splat(cap));
+    [depth - half, depth + half]
+}
+
 /// The sums of a layer.
-struct Sums<L> {
-    weight: L,
+pub struct Sums<L> {
+    /// Of the weights.
+    pub weight: L,
     weight_opacity: L,
-    weight_opacity_color: [L; 3],
+    /// Of weight times opacity times colour.
+    pub weight_opacity_color: [L; 3],
 }
 
 impl<L: Lanes> Sums<L> {
@@ -201,9 +245,15 @@ impl<L: Lanes> Sums<L> {
         Self { weight: zero, weight_opacity: zero, weight_opacity_color: [zero; 3] }
     }
 
+    /// Those of opaque fragments: of weights, and of weights times colours.
+    #[inline(always)]
+    pub fn opaque(weight: L, weight_color: [L; 3]) -> Self {
+        Self { weight, weight_opacity: weight, weight_opacity_color: weight_color }
+    }
+
     /// Adds a fragment a lane; its weight is 0 where there is none.
     #[inline(always)]
-    fn add<const OPAQUE: bool>(&mut self, weight: L, surface: &SplatSurface) {
+    pub fn add<const OPAQUE: bool>(&mut self, weight: L, surface: &SplatSurface) {
         let weight_opacity = if OPAQUE { weight } else { weight * L::splat(surface.opacity) };
         self.weight = self.weight + weight;
         self.weight_opacity = if OPAQUE { self.weight } else { self.weight_opacity + weight_opacity };
@@ -265,13 +315,10 @@ impl<L: Lanes, const OPAQUE: bool> CellResolver<'_, L, OPAQUE> {
         nearest
     }
 
-    /// Near and far end of the intervals of an entry's fragments; not a number where there is none.
+    /// [`interval`] of an entry.
     #[inline(always)]
     fn interval(&self, entry: Entry, surface: &SplatSurface) -> [L; 2] {
-        let depth = L::load(&self.buffer.record(entry).depth);
-        let [slope, cap] = surface.interval;
-        let half = (L::splat(slope) * depth).least(L::splat(cap));
-        [depth - half, depth + half]
+        interval(L::load(&self.buffer.record(entry).depth), surface)
     }
 
     /// Composites all of a facing's fragments as one layer, if it is one wherever it is hit: if in each sample the

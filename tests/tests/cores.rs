@@ -657,13 +657,16 @@ fn layered() -> impl Strategy<Value = (Sheets, f64, u64)> {
 fn sheets_agree() {
     let layers = RefCell::new(BTreeMap::<usize, usize>::new());
     let coverage = prop_oneof![Just(OPAQUE), Just(soft(1.0)), Just(soft(0.5)), Just(soft(8.0))];
-    let case = (layered(), coverage, aovs(), 1u32..18, any::<bool>());
-    check(48, 3, case, |((made, thickness, seed), resolve, aovs, samples, lens)| {
-        let cloud = sheets(&made, seed);
+    // Both sides of splats, or one: surfaces of one side are summed without being stored, where they are smooth.
+    let sides = prop_oneof![Just((true, false)), Just((true, true)), Just((false, false))];
+    let case = (layered(), coverage, aovs(), 1u32..18, any::<bool>(), sides);
+    check(72, 3, case, |((made, thickness, seed), resolve, aovs, samples, lens, (oriented, cull))| {
+        let mut cloud = sheets(&made, seed);
+        cloud.oriented &= oriented;
         let camera = pinhole(40, 36, 60.0);
         let lens_of = Lens { radius: 0.4, focus: 4.5, blades: 0 };
         let camera = if lens { with_lens(camera, lens_of) } else { camera };
-        let options = RenderOptions { samples, resolve, thickness, aovs, ..RenderOptions::default() };
+        let options = RenderOptions { samples, resolve, thickness, aovs, cull, ..RenderOptions::default() };
         check_pictures(&cloud, &camera, &options, &[2], &TILE_MEMORY[seed as usize % 3..][..1]);
         // That there was something to tell apart.
         let aovs = AovSelection { layers: true, ..AovSelection::default() };
