@@ -3,6 +3,7 @@
 //! Files are read by a child: this very program, told to run [`child`] on the files of a folder. So even a stack that
 //! overflows ends only the child, and the system can say how much memory each file took.
 
+use splat_tests::cases;
 use splat_tests::damaged::{DamagedFile, corpus};
 use splat_tests::fuzz_bodies::{self, Body};
 use splat_tests::random::Random;
@@ -202,12 +203,13 @@ fn harm_is_noticed() {
     }
 }
 
-/// Random bytes as scenes, fragments and footprints: what the fuzz targets do, for a moment.
+/// Random bytes as scenes, fragments and footprints: what the fuzz targets do, for a moment; `SPLAT_CASES=N` tries N times
+/// as many.
 #[test]
 fn random_bytes_make_sound_kernels() {
     for (Body { name, run }, cases) in fuzz_bodies::KERNELS.into_iter().zip([2000, 4000, 300, 150]) {
         let mut random = Random::new(7);
-        for case in 0..cases {
+        for case in 0..cases * cases::factor() {
             let bytes: Vec<u8> = (0..16 + random.index(400)).map(|_| random.index(256) as u8).collect();
             let outcome = std::panic::catch_unwind(|| run(&bytes));
             assert!(outcome.is_ok(), "{name}, case {case}: {bytes:?}");
