@@ -5,7 +5,6 @@
 
 use crate::arguments::{MaterialArguments, RenderArguments};
 use crate::console::Console;
-use crate::memory::film_bytes_per_pixel;
 use crate::scene;
 use clap::Args;
 use splat_core::setup::View;
@@ -176,7 +175,7 @@ impl Checkpoint<'_> {
         }
         let frame = [self.camera.width, self.camera.height];
         let window = View::new(&self.camera, options).window;
-        if window.area().saturating_mul(film_bytes_per_pixel(options)) > options.memory {
+        if window.area().saturating_mul(options.film_bytes_per_pixel()) > options.memory {
             // It is refused at once, by whom knows the words.
             return Ok(None);
         }

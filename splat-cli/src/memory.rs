@@ -6,7 +6,7 @@
 use clap::Args;
 use splat_core::memory::Budget;
 use splat_core::prepare::PrepareOptions;
-use splat_core::{Cloud, Error, RenderOptions, SampleSums};
+use splat_core::{Cloud, Error, RenderOptions};
 use splat_io::memory::{memory_of_cloud, memory_of_image, memory_of_mesh};
 use std::path::Path;
 
@@ -120,14 +120,8 @@ impl Memory {
         if !self.is_limited() {
             return usize::MAX;
         }
-        self.left().saturating_sub(EXR_LINES * width as usize * film_bytes_per_pixel(options))
+        self.left().saturating_sub(EXR_LINES * width as usize * options.film_bytes_per_pixel())
     }
-}
-
-/// Bytes that the film of a picture with these options takes for each pixel, its sums included.
-pub fn film_bytes_per_pixel(options: &RenderOptions) -> usize {
-    let sums = if options.takes_part_of_samples() { SampleSums::bytes_per_pixel(options.aovs) } else { 0 };
-    options.aovs.bytes_per_pixel() + sums
 }
 
 /// Memory that this process holds, in bytes: Linux tells.

@@ -3,7 +3,7 @@
 use crate::kernel::{Kernel, TableMode};
 use crate::sampling::{PatternKind, PixelFilter};
 use crate::shade::Optics;
-use crate::{AovSelection, Cloud, Error, Materials, PixelRect};
+use crate::{AovSelection, Cloud, Error, Materials, PixelRect, SampleSums};
 use glam::DVec3;
 use splat_abuffer::{Coverage, Resolve, Thickness};
 use std::ops::Range;
@@ -114,6 +114,12 @@ impl RenderOptions {
     /// Whether those are not all: then the rest is to be added, and the film keeps its sums.
     pub fn takes_part_of_samples(&self) -> bool {
         self.sample_range() != (0..self.samples)
+    }
+
+    /// Bytes that the film takes for each pixel, with its sums if it keeps them.
+    pub fn film_bytes_per_pixel(&self) -> usize {
+        let sums = if self.takes_part_of_samples() { SampleSums::bytes_per_pixel(self.aovs) } else { 0 };
+        self.aovs.bytes_per_pixel() + sums
     }
 
     /// Checks every field.

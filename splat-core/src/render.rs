@@ -5,7 +5,6 @@ use crate::memory::{Budget, filled};
 use crate::pixel::PixelResolver;
 use crate::raster::{Rasterizer, SamplePlace};
 use crate::setup::{SetUp, SortKey, View, VisibleSplat, set_up, sort_keys};
-use crate::sums::SampleSums;
 use crate::texture::ScalarLookup;
 use crate::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions};
 use splat_abuffer::{Fragment, MAX_RANK, SplatSurface, TileBuffer};
@@ -228,8 +227,7 @@ fn budget(cloud: &Cloud, camera: &Camera, view: &View, options: &RenderOptions) 
     let per_sample = if camera.lens().is_some() { LENS_SAMPLE_BYTES } else { SAMPLE_BYTES };
     let samples = per_sample * options.samples as usize;
     memory.take("the table of samples", samples, "fewer samples (--spp) need less")?;
-    let of_sums = if options.takes_part_of_samples() { SampleSums::bytes_per_pixel(options.aovs) } else { 0 };
-    let film = view.window.area().saturating_mul(options.aovs.bytes_per_pixel() + of_sums);
+    let film = view.window.area().saturating_mul(options.film_bytes_per_pixel());
     memory.take(FILM, film, SMALLER_FILM)?;
     let mut splats = cloud.len();
     if splats.saturating_mul(SET_UP_BYTES) > memory.left() {

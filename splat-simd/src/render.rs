@@ -320,7 +320,7 @@ impl<'a> Picture<'a> {
         let (images, level) = (&renderer.images, renderer.level);
         // A splat may need as much as is there, and buffers grow by doubling: they may take four times their use, and once more
         // while they move.
-        let films = 2 * TILES_A_REPORT * PLACES * options.aovs.bytes_per_pixel();
+        let films = 2 * TILES_A_REPORT * PLACES * options.film_bytes_per_pixel();
         let others = WORKER_BYTES * options.samples as usize + films;
         let share = (memory.left() / renderer.threads()).saturating_sub(others) / 5;
         let samples = LaneSamples::new(&frame.rasterizer);
