@@ -579,7 +579,7 @@ mod tests {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }
         for line in
-            ["--max-memory 0", "--max-memory 2Q", "--max-memory M", "--max-memory -1", "--checkpoint x"]
+            ["--max-memory 0", "--max-memory 2Q", "--max-memory M", "--max-memory=-1", "--checkpoint x"]
         {
             assert_eq!(render(line).unwrap_err(), ErrorKind::ValueValidation, "{line}");
         }

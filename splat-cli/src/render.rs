@@ -110,6 +110,9 @@ fn check_outputs(arguments: &RenderArguments, aovs: AovSelection, inputs: &[Path
     output::spare_inputs(&picture, inputs)?;
     output::check_picture(&picture, aovs, arguments.outputs.aov_files)?;
     if let Some(path) = arguments.outputs.stats.as_deref().filter(|path| !is_stdout(path)) {
+        if *path == picture {
+            return Err(UsageError::new(format!("--stats {} is the picture", path.display())).into());
+        }
         output::spare_inputs(path, inputs)?;
         output::check_file(path)?;
     }

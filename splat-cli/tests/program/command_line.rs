@@ -221,6 +221,7 @@ fn exit_codes_and_messages_tell_who_is_to_blame() {
         "render in.ply -o out.png --aov depth",
         "render in.ply -o out.png --engine slow",
         "render in.ply -o out.png --kernel cubic",
+        "render in.ply -o out.png --stats out.png",
         "paint in.ply",
     ];
     for arguments in usage {
