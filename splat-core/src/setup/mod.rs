@@ -106,9 +106,6 @@ pub struct SetUp {
 /// Numbers of splats, by the cause of dropping them.
 pub type Dropped = BTreeMap<&'static str, usize>;
 
-/// Splats that are set up together.
-const AT_ONCE: usize = 1024;
-
 /// The cause of dropping a splat whose projection has no area that `f32` could tell.
 const EDGE_ON: &str = "edge_on";
 
@@ -128,51 +125,39 @@ impl SetUp {
 
     /// Sets up the next splats, given their indices in splat order.
     pub fn extend(&mut self, cloud: &Cloud, view: &View, options: &RenderOptions, order: &[u32]) {
-        let mut splats = Vec::with_capacity(order.len().min(AT_ONCE));
-        for order in order.chunks(AT_ONCE) {
-            // First all in camera space: so the loops are short, and the processor works on several splats at once.
-            splats.clear();
-            splats.extend(order.iter().map(|&index| camera_splat(cloud, index as usize, view)));
-            for (&index, splat) in order.iter().zip(&splats) {
-                if let Outcome::EdgeOn = self.push(cloud, index as usize, splat, view, options) {
-                    count_dropped(&mut self.dropped, EDGE_ON, 1);
-                }
+        for &index in order {
+            if let Outcome::EdgeOn = self.push(cloud, index as usize, view, options) {
+                count_dropped(&mut self.dropped, EDGE_ON, 1);
             }
         }
     }
 
     /// Sets up the next splat, if it is to be seen.
     #[inline(always)]
-    fn push(
-        &mut self,
-        cloud: &Cloud,
-        index: usize,
-        splat: &CameraSplat,
-        view: &View,
-        options: &RenderOptions,
-    ) -> Outcome {
+    fn push(&mut self, cloud: &Cloud, index: usize, view: &View, options: &RenderOptions) -> Outcome {
+        let splat = camera_splat(cloud, index, view);
         let usual = view.radius * (1.0 + margin::USUAL);
-        let Some(exact) = project(splat, view) else {
+        let Some(exact) = project(&splat, view) else {
             // A line. It counts as dropped only where it would be seen.
-            let seen = exact_box(splat, usual, view).map(|screen| candidates(splat, &screen, usual, view));
+            let seen = exact_box(&splat, usual, view).map(|screen| candidates(&splat, &screen, usual, view));
             return if seen.is_some_and(|bounds| bounds.is_empty()) {
                 Outcome::Culled
             } else {
                 Outcome::EdgeOn
             };
         };
-        let Some(mut image) = Image::new(splat, &exact, usual, view) else { return Outcome::EdgeOn };
-        let mut bounds = candidates(splat, &image.screen, usual, view);
+        let Some(mut image) = Image::new(&splat, &exact, usual, view) else { return Outcome::EdgeOn };
+        let mut bounds = candidates(&splat, &image.screen, usual, view);
         if bounds.is_empty() {
             return Outcome::Culled;
         }
-        let Some(margin) = rounding_margin(splat, &exact, &image.screen, view) else {
+        let Some(margin) = rounding_margin(&splat, &exact, &image.screen, view) else {
             return Outcome::EdgeOn;
         };
         let radius = margin.radius.max(usual);
         if radius > usual {
-            let Some(wider) = Image::new(splat, &exact, radius, view) else { return Outcome::EdgeOn };
-            bounds = candidates(splat, &wider.screen, radius, view);
+            let Some(wider) = Image::new(&splat, &exact, radius, view) else { return Outcome::EdgeOn };
+            bounds = candidates(&splat, &wider.screen, radius, view);
             image = wider;
             if bounds.is_empty() {
                 return Outcome::Culled;
@@ -182,8 +167,8 @@ impl SetUp {
         if !constants.is_finite() {
             return Outcome::EdgeOn;
         }
-        let depth = view.depth_extent(splat, radius);
-        self.surfaces.push(surface(cloud, index, splat, &exact, view, options));
+        let depth = view.depth_extent(&splat, radius);
+        self.surfaces.push(surface(cloud, index, &splat, &exact, view, options));
         self.splats.push(VisibleSplat {
             constants,
             bounds,
