@@ -5,25 +5,27 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use proptest::sample::select;
 
+/// Numbers at which formulas break.
+pub const REMARKABLE: [f32; 12] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e-45,
+    f32::EPSILON,
+];
+
 /// Any pattern of bits of an `f32`, the remarkable ones and ordinary numbers often.
 pub fn any_f32() -> impl Strategy<Value = f32> + Clone {
-    let remarkable = [
-        0.0,
-        -0.0,
-        1.0,
-        -1.0,
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN,
-        f32::MIN_POSITIVE,
-        1e-45,
-        f32::EPSILON,
-    ];
     prop_oneof![
         any::<u32>().prop_map(f32::from_bits),
-        select(remarkable.to_vec()),
+        select(REMARKABLE.to_vec()),
         -3.0..3.0f32,
         -0.5..0.5f32
     ]

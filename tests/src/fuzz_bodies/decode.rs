@@ -1,5 +1,6 @@
 //! Numbers from bytes. Where the bytes end, all further ones are zero: so any bytes mean something.
 
+use crate::textures::REMARKABLE;
 use glam::{DVec3, Vec2, Vec3};
 
 /// The bytes that are left.
@@ -46,20 +47,6 @@ impl Bytes<'_> {
 
     /// Any bits, remarkable ones, or an ordinary number.
     pub fn any(&mut self) -> f32 {
-        const REMARKABLE: [f32; 12] = [
-            0.0,
-            -0.0,
-            1.0,
-            -1.0,
-            f32::NAN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            f32::MAX,
-            f32::MIN_POSITIVE,
-            1e-45,
-            f32::EPSILON,
-            1e19,
-        ];
         match self.byte() % 4 {
             0 => f32::from_bits(u32::from_le_bytes(self.array())),
             1 => self.pick(&REMARKABLE),
