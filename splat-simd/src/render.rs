@@ -460,7 +460,9 @@ impl<'a> Picture<'a> {
             (tests, worker.records.fragments)
         };
         if !worker.records.is_complete() {
-            worker.sums.clear();
+            if summed {
+                worker.sums.clear();
+            }
             statistics.raster += start.elapsed();
             if region.area() == 1 {
                 let bytes = RecordBuffer::BYTES_PER_RECORD;
