@@ -1,7 +1,9 @@
 //! Both cores side by side: their fragments, splat by splat.
 
 use crate::lanes::{LANES, Level};
-use crate::lattice::{CellNumber, Lattice};
+use crate::lattice::{CellList, Lattice};
+use crate::lens_image::LensImages;
+use crate::lens_sums::{LensHitsJob, LensSamples, LensSums};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
@@ -16,29 +18,41 @@ use splat_core::{Camera, Cloud, Error, PixelRect, RenderOptions};
 /// Pixels around a splat's candidates in which [`compare`] looks for hits of the reference that neither core visits.
 const BORDER: i32 = 2;
 
+/// Bytes for samples in some orders: less than a frame takes, so that not every splat finds one made for it.
+const ORDER_BYTES: usize = 1 << 20;
+
 /// The fast core, one splat at a time.
 struct SplatBySplat<'a> {
     frame: &'a Frame,
     samples: LaneSamples,
     lattice: Option<Lattice>,
+    lens_samples: Option<LensSamples>,
     level: Level,
     records: RecordBuffer,
     places: PlaceList,
     distorted: DistortedSamples,
-    cells: Vec<CellNumber>,
+    cells: CellList,
+    lens_sums: LensSums,
 }
 
 impl<'a> SplatBySplat<'a> {
     fn new(frame: &'a Frame, level: Level) -> Self {
+        let images = LensImages::new(&frame.view);
+        let lens_samples = images.map(|images| {
+            let defocus = images.defocus_range(&frame.set_up.splats);
+            LensSamples::new(&frame.rasterizer, images, defocus, ORDER_BYTES)
+        });
         Self {
             frame,
             samples: LaneSamples::new(&frame.rasterizer),
-            lattice: Lattice::new(&frame.rasterizer, &frame.view),
+            lattice: images.map(|images| Lattice::new(&frame.rasterizer, images)),
+            lens_samples,
             level,
             records: RecordBuffer::default(),
             places: PlaceList::default(),
             distorted: DistortedSamples::default(),
-            cells: Vec::new(),
+            cells: CellList::default(),
+            lens_sums: LensSums::default(),
         }
     }
 
@@ -51,22 +65,51 @@ impl<'a> SplatBySplat<'a> {
             for column in bounds.x0.div_euclid(TILE)..=(bounds.x1 - 1).div_euclid(TILE) {
                 let [x, y] = [column * TILE, row * TILE];
                 let tile = PixelRect::new(x, y, x + TILE, y + TILE);
-                tests += self.rasterize(rank, tile.intersect(&self.frame.view.window), method);
-                self.collect([x, y], method, sink);
+                let region = tile.intersect(&self.frame.view.window);
+                if method == Method::LensSamples && self.shows_one_side(rank) {
+                    tests += self.hit(rank, region);
+                    self.collect_hits(rank, [x, y], sink);
+                } else {
+                    tests += self.rasterize(rank, region, method);
+                    self.collect([x, y], method, sink);
+                }
             }
         }
         tests
     }
 
+    /// Whether a lens, if there is one, shows but one side of a splat.
+    fn shows_one_side(&self, rank: usize) -> bool {
+        let one = !self.frame.set_up.splats[rank].flips || self.frame.rasterizer.culls();
+        one && self.lens_samples.is_some()
+    }
+
+    /// Finds the fragments of a splat in a region of a tile sample by sample. Returns the number of samples tested.
+    fn hit(&mut self, rank: usize, region: PixelRect) -> u64 {
+        let frame = RasterFrame::new(self.frame, &self.samples);
+        let (rank, buffers) = (rank as u32, &mut self.lens_sums);
+        self.lens_samples
+            .as_ref()
+            .map_or(0, |samples| self.level.run_single(LensHitsJob { frame, samples, rank, region, buffers }))
+    }
+
+    /// Gives those fragments to `sink`.
+    fn collect_hits(&self, rank: usize, corner: [i32; 2], sink: &mut dyn FnMut(SamplePlace, Fragment)) {
+        let first = self.frame.rasterizer.range().start;
+        // What shows both sides is culled.
+        let splat = &self.frame.set_up.splats[rank];
+        let back = splat.back && !splat.flips;
+        for ([cell, lane], depth, weight) in self.lens_sums.found() {
+            let [column, row] = pixel_of((cell % PLACES) as u16);
+            let sample = first + cell / PLACES * LANES + lane;
+            let place = SamplePlace { x: corner[0] + column, y: corner[1] + row, sample };
+            sink(place, Fragment::new(depth, weight, rank as u32, back));
+        }
+    }
+
     /// Makes the fragments of a splat in a region of a tile.
     fn rasterize(&mut self, rank: usize, region: PixelRect, method: Method) -> u64 {
-        let frame = RasterFrame {
-            rasterizer: &self.frame.rasterizer,
-            samples: &self.samples,
-            splats: &self.frame.set_up.splats,
-            surfaces: &self.frame.set_up.surfaces,
-            filter_radius: self.frame.view.filter_radius as f32,
-        };
+        let frame = RasterFrame::new(self.frame, &self.samples);
         let candidates = self.frame.set_up.splats[rank].bounds.intersect(&region);
         self.distorted.fill(&self.frame.rasterizer, &candidates, self.level);
         let Self { records, places, distorted, cells, .. } = self;
@@ -74,9 +117,7 @@ impl<'a> SplatBySplat<'a> {
         let ranks = &[rank as u32];
         let tests = match (method, &self.lattice) {
             (Method::LensPoints, Some(lattice)) => {
-                let images = &[lattice.image(&self.frame.set_up.splats[rank])];
-                let target = Target::Records;
-                let job = LatticeJob { frame, lattice, ranks, images, region, records, cells, target };
+                let job = LatticeJob { frame, lattice, ranks, region, records, cells };
                 self.level.run_single(job)
             }
             _ => {
@@ -111,18 +152,21 @@ impl<'a> SplatBySplat<'a> {
     }
 }
 
-/// How the fast core looks for fragments: both ways find the same.
+/// How the fast core looks for fragments: all ways find the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Pixel by pixel, eight samples of each at once.
     Pixels,
     /// Eight neighbouring points of the lens at once, for large circles of confusion; without a lens pixel by pixel.
     LensPoints,
+    /// Sample by sample, where they look through the lens; without a lens, or for splats of which it shows both sides, pixel by
+    /// pixel.
+    LensSamples,
 }
 
 impl Method {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Pixels, Self::LensPoints];
+    /// Every one.
+    pub const ALL: [Self; 3] = [Self::Pixels, Self::LensPoints, Self::LensSamples];
 }
 
 /// Gives every fragment of a picture to `sink`, as [`splat_core::fragments()`] does: splat by splat in splat order, but
@@ -165,7 +209,8 @@ pub struct Difference {
 
 /// Runs both cores side by side over every splat, and gives the first fragment in which they differ, bit for bit, or
 /// else the number of fragments in which they agree. The reference tests every sample of the splat's box and of a border
-/// around it, wherever the fast core looks, and through a lens the fast core looks by both of its methods. `progress` is told the finished part, from 0 to 1.
+/// around it, wherever the fast core looks, and through a lens the fast core looks by all of its methods. `progress` is told
+/// the finished part, from 0 to 1.
 ///
 /// # Errors
 /// As [`splat_core::render()`].

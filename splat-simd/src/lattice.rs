@@ -5,13 +5,13 @@
 //! of spacing 8, and of eight neighbouring lens points (a *group*) each block has one sample each: a cell. So a splat
 //! looks, for every group, only at the blocks in which its disc lies, about one: the work does not grow with the blur.
 
-use crate::evaluate::LaneHits;
 use crate::lanes::{Eight, LANES, Lanes};
-use crate::places::{PLACES, TILE, place_of};
+use crate::lens_image::{Image, LensImages, Nearness};
+use crate::places::{Apart, PLACES, TILE, place_of};
 use splat_core::PixelRect;
 use splat_core::raster::Rasterizer;
-use splat_core::sampling::{BLOCK, PATTERNS};
-use splat_core::setup::{BOX_PADDING, MAX_ERROR, USUAL_MARGIN, View, VisibleSplat};
+use splat_core::sampling::{BLOCK, PATTERNS, SampleTable};
+use splat_core::setup::{BOX_PADDING, VisibleSplat};
 
 /// Blocks a side of a tile.
 const BLOCKS: usize = TILE as usize / BLOCK;
@@ -33,14 +33,65 @@ struct Cell {
     jitter: [Eight; 2],
 }
 
-/// The number of a cell, and that of its group.
-#[derive(Debug, Clone, Copy)]
-pub struct CellNumber {
-    /// Blocks times groups, plus group.
-    pub cell: u32,
-    /// Group of lens points.
-    pub group: u32,
+/// A list of cells, by their numbers.
+#[derive(Debug, Default)]
+pub struct CellList {
+    /// The first `count` are in use.
+    cells: Vec<u32>,
+    count: usize,
+    /// Scratch: cells whose blocks are reached.
+    reached: Vec<u32>,
 }
+
+impl CellList {
+    /// The cells.
+    #[inline(always)]
+    pub fn cells(&self) -> &[u32] {
+        &self.cells[..self.count]
+    }
+
+    /// Makes room for this many cells.
+    #[inline(always)]
+    fn reserve(&mut self, cells: usize) {
+        // More are written than kept.
+        if self.cells.len() <= cells {
+            self.cells.resize(cells + 1, 0);
+            self.reached.resize(cells + BLOCKS * BLOCKS, 0);
+        }
+    }
+}
+
+/// Some blocks of a tile, the first `count` of `blocks`: those of some neighbouring columns and rows.
+#[derive(Debug, Clone, Copy)]
+struct BlockRange {
+    count: u32,
+    blocks: [u8; BLOCKS * BLOCKS],
+}
+
+/// The number of an empty range.
+const NO_BLOCKS: usize = BLOCKS - 1;
+
+/// Those from a column and a row (in bits 0 and 1, and 2 and 3) to others (in bits 4 and 5, 6 and 7).
+const BLOCK_RANGES: [BlockRange; 256] = {
+    let mut ranges = [BlockRange { count: 0, blocks: [0; BLOCKS * BLOCKS] }; 256];
+    let mut number = 0;
+    while number < ranges.len() {
+        let [first_column, first_row, last_column, last_row] =
+            [number & 3, number >> 2 & 3, number >> 4 & 3, number >> 6];
+        let range = &mut ranges[number];
+        let mut block = 0;
+        while block < BLOCKS * BLOCKS {
+            let [column, row] = [block % BLOCKS, block / BLOCKS];
+            if first_column <= column && column <= last_column && first_row <= row && row <= last_row {
+                range.blocks[range.count as usize] = block as u8;
+                range.count += 1;
+            }
+            block += 1;
+        }
+        number += 1;
+    }
+    ranges
+};
 
 /// The samples of a frame, by groups of lens points.
 #[derive(Debug)]
@@ -49,7 +100,7 @@ pub struct Lattice {
     lens: Vec<[Eight; 2]>,
     /// For eight groups at a time their boxes on the lens: middle and half the length in x, and in y.
     boxes: Vec<[Eight; 4]>,
-    /// Block by block, of each group.
+    /// Group by group, of each block.
     cells: Vec<Cell>,
     /// The same: where in the tile the samples are, to rounding.
     positions: Vec<[Eight; 2]>,
@@ -59,21 +110,14 @@ pub struct Lattice {
     cell_of: Vec<(u32, u8)>,
     /// Number of samples a pixel.
     count: usize,
-    near: f64,
-    /// 1 / focus.
-    inverse_focus: f64,
-    /// sqrt(F).
-    radius: f64,
-    filter_radius: f64,
-    /// Mean side of the groups' boxes on the lens, and radius of the lens, in pixels at depth 1.
+    images: LensImages,
+    /// Mean side of the groups' boxes on the lens, in pixels at depth 1.
     group_size: f64,
-    lens_radius: f64,
 }
 
 impl Lattice {
-    /// The lattice of a frame; `None` without a lens, and if it distorts: then no two pixels share their positions.
-    pub fn new(rasterizer: &Rasterizer, view: &View) -> Option<Self> {
-        let lens = view.lens.filter(|_| view.distortion.is_none())?;
+    /// The lattice of a frame with a lens that does not distort.
+    pub fn new(rasterizer: &Rasterizer, images: LensImages) -> Self {
         let range = rasterizer.range();
         let table = rasterizer.samples();
         let mut points: Vec<LensSample> = (0..PATTERNS)
@@ -94,52 +138,41 @@ impl Lattice {
             samples: Vec::new(),
             cell_of: vec![(0, 0); PLACES * range.len()],
             count: range.len(),
-            near: view.near,
-            inverse_focus: 1.0 / lens.focus,
-            radius: view.cutoff.sqrt(),
-            filter_radius: view.filter_radius,
-            lens_radius: lens.radius * view.pixel_scale.max_element(),
+            images,
         };
-        for block in 0..BLOCKS * BLOCKS {
-            lattice.add_block(block, &groups, rasterizer);
+        let pixels: [_; BLOCKS * BLOCKS] = std::array::from_fn(|block| pixels_of_patterns(table, block));
+        for group in groups {
+            for pixel_of in &pixels {
+                lattice.add_cell(group, group.map(|point| pixel_of[point.pattern]), rasterizer);
+            }
         }
-        Some(lattice)
+        lattice
     }
 
-    /// Adds the cells of a block.
-    fn add_block(&mut self, block: usize, groups: &[&[LensSample; LANES]], rasterizer: &Rasterizer) {
+    /// Adds the cell of a group that lies in these pixels of a tile.
+    fn add_cell(&mut self, group: &[LensSample; LANES], pixels: [[i32; 2]; LANES], rasterizer: &Rasterizer) {
         let table = rasterizer.samples();
+        let number = self.cells.len() as u32;
+        let jitter: [[f32; 2]; LANES] = std::array::from_fn(|lane| {
+            let [x, y] = pixels[lane];
+            table.jitter(x, y)[group[lane].sample]
+        });
+        let cell = Cell {
+            pixel: [0, 1].map(|axis| pixels.map(|pixel| pixel[axis] as f32)),
+            jitter: [0, 1].map(|axis| jitter.map(|jitter| jitter[axis])),
+        };
+        let position = |axis: usize, lane: usize| cell.pixel[axis][lane] + cell.jitter[axis][lane];
+        self.positions.push([0, 1].map(|axis| std::array::from_fn(|lane| position(axis, lane))));
+        self.cells.push(cell);
         let first = rasterizer.range().start;
-        let corner = [block % BLOCKS * BLOCK, block / BLOCKS * BLOCK];
-        // Where in the block each lens pattern stands.
-        let mut pixel_of = [[0; 2]; PATTERNS];
-        for i in 0..PATTERNS {
-            let [x, y] = [corner[0] + i % BLOCK, corner[1] + i / BLOCK].map(|coordinate| coordinate as i32);
-            pixel_of[table.patterns_of(x, y)[1]] = [x, y];
+        let samples = std::array::from_fn(|lane| {
+            let [x, y] = pixels[lane];
+            (place_of(x, y), (group[lane].sample - first) as u32)
+        });
+        for (lane, &(place, sample)) in samples.iter().enumerate() {
+            self.cell_of[usize::from(place) * self.count + sample as usize] = (number, lane as u8);
         }
-        for group in groups {
-            let pixels = group.map(|point| pixel_of[point.pattern]);
-            let jitter = |lane: usize, axis: usize| {
-                let [x, y] = pixels[lane];
-                table.jitter(x, y)[group[lane].sample][axis]
-            };
-            let number = self.cells.len() as u32;
-            let cell = Cell {
-                pixel: [0, 1].map(|axis| pixels.map(|pixel| pixel[axis] as f32)),
-                jitter: [0, 1].map(|axis| std::array::from_fn(|lane| jitter(lane, axis))),
-            };
-            let position = |axis: usize, lane: usize| cell.pixel[axis][lane] + cell.jitter[axis][lane];
-            self.positions.push([0, 1].map(|axis| std::array::from_fn(|lane| position(axis, lane))));
-            self.cells.push(cell);
-            let samples = std::array::from_fn(|lane| {
-                let [x, y] = pixels[lane];
-                (place_of(x, y), (group[lane].sample - first) as u32)
-            });
-            for (lane, &(place, sample)) in samples.iter().enumerate() {
-                self.cell_of[usize::from(place) * self.count + sample as usize] = (number, lane as u8);
-            }
-            self.samples.push(samples);
-        }
+        self.samples.push(samples);
     }
 
     /// Number of cells of a tile.
@@ -160,132 +193,86 @@ impl Lattice {
     }
 
     /// Whether a splat has less to test here than pixel by pixel, by an estimate; and by how many cells.
-    pub fn gain(&self, splat: &VisibleSplat, image: Option<&Image>, region: &PixelRect) -> f64 {
-        let Some(image) = image else { return 0.0 };
-        let blur = self.lens_radius * image.defocus.map(f64::abs).into_iter().fold(0.0, f64::max);
-        let [width, height] = [0, 1].map(|axis| image.max[axis] - image.min[axis] + 2.0 * self.filter_radius);
+    pub fn gain(&self, splat: &VisibleSplat, region: &PixelRect) -> f64 {
+        let Some(image) = self.images.image(splat) else { return 0.0 };
+        let blur = self.images.lens_radius * image.defocus.map(f64::abs).into_iter().fold(0.0, f64::max);
+        let [width, height] =
+            [0, 1].map(|axis| image.max[axis] - image.min[axis] + 2.0 * self.images.filter_radius);
         let share = splat.bounds.intersect(region).area() as f64 / splat.bounds.area() as f64;
         let by_pixels =
             0.8 * (width + 2.0 * blur) * (height + 2.0 * blur) * (self.count as f64 / LANES as f64);
-        let group = self.group_size / self.lens_radius * blur;
+        let group = self.group_size / self.images.lens_radius * blur;
         let blocks = |side: f64| 1.0 + (side + group) / BLOCK as f64;
         let groups = self.lens.len() as f64;
         // Each group's box takes about as long as a cell's eighth in every tile that the splat may touch.
         share * (by_pixels - groups * blocks(width) * blocks(height)) - groups / LANES as f64
     }
 
-    /// What a pinhole sees of a splat, and how far its depths are out of focus. `None` if that is not known.
-    pub fn image(&self, splat: &VisibleSplat) -> Option<Image> {
-        if !splat.outline.is_known() {
-            return None;
-        }
-        // The ellipse of `splat_core::setup::Outline`, without the circle of confusion.
-        let c = &splat.constants;
-        let [a1, b0, b1, depth] = [c.a1, c.b[0], c.b[1], c.depth].map(f64::from);
-        let (q, m) = (1.0 / a1, 1.0 / b0);
-        let p = -b1 * q * m;
-        let [s0, s1] = c.depth_slope.map(|slope| f64::from(slope) / depth);
-        let radius = if splat.certain { self.radius * (1.0 + USUAL_MARGIN) } else { self.radius + MAX_ERROR };
-        let square = radius * radius;
-        let steepness = s0 * s0 + s1 * s1;
-        let clearance = 1.0 - square * steepness;
-        if clearance < 1.0 / 32.0 {
-            return None;
-        }
-        let scale = square / clearance;
-        let center = [-scale * (p * s0 + m * s1), -scale * q * s0];
-        // The constants are rounded; that is little against the padding.
-        let half = [scale * (p * p + m * m) + center[0] * center[0], scale * q * q + center[1] * center[1]]
-            .map(|square| square.sqrt() * (1.0 + 1e-5) + BOX_PADDING);
-        let middle = [f64::from(c.xf) + center[0], f64::from(c.yf) + center[1]];
-        let half_depth = depth * radius * steepness.sqrt() * (1.0 + 1e-5);
-        let nearest = (depth - half_depth).max(self.near) * (1.0 - 1e-4);
-        let defocus = [nearest, (depth + half_depth) * (1.0 + 1e-5)].map(|w| self.inverse_focus - 1.0 / w);
-        Some(Image {
-            min: [middle[0] - half[0], middle[1] - half[1]],
-            max: [middle[0] + half[0], middle[1] + half[1]],
-            defocus,
-        })
-    }
-
     /// Lists the cells of a tile (given by its first pixel) in which a splat may be hit.
     #[inline(always)]
-    pub fn list<L: Lanes>(
-        &self,
-        splat: &VisibleSplat,
-        image: Option<&Image>,
-        corner: [i32; 2],
-        list: &mut Vec<CellNumber>,
-    ) {
-        list.clear();
-        let groups = self.lens.len() as u32;
-        let Some(image) = image else {
-            let blocks = 0..(BLOCKS * BLOCKS) as u32;
-            let cells = blocks.flat_map(|block| (0..groups).map(move |group| (block * groups, group)));
-            list.extend(cells.map(|(first, group)| CellNumber { cell: first + group, group }));
-            return;
-        };
-        let [x, y] = [0, 1].map(|axis| self.reach(image, axis, splat, corner));
+    pub fn list<L: Lanes>(&self, splat: &VisibleSplat, corner: [i32; 2], list: &mut CellList) {
+        list.reserve(self.cells.len());
+        if let Some(image) = &self.images.image(splat) {
+            let reach = [0, 1].map(|axis| self.reach(image, axis, splat, corner));
+            let count = self.list_reached::<L>(&reach, &mut list.reached);
+            let near = [0, 1].map(|axis| self.images.nearness(image, axis, splat, corner));
+            self.keep_near::<L>(&near, count, list);
+        } else {
+            list.count = self.cells.len();
+            list.cells.iter_mut().zip(0..self.cells.len() as u32).for_each(|(cell, number)| *cell = number);
+        }
+    }
+
+    /// Lists the cells whose blocks a splat reaches. Returns their number.
+    #[inline(always)]
+    fn list_reached<L: Lanes>(&self, [x, y]: &[Reach; 2], list: &mut [u32]) -> usize {
+        let mut count = 0;
         for (eight, boxes) in self.boxes.iter().enumerate() {
-            // Bit l + 8 b is set where the box of group l reaches block b of a row, or of a column.
-            let columns = x.blocks::<L>(&boxes[0], &boxes[1]);
-            let rows = y.blocks::<L>(&boxes[2], &boxes[3]);
-            if columns == 0 || rows == 0 {
+            let (columns, column_range) = x.blocks::<L>(&boxes[0], &boxes[1]);
+            let (rows, row_range) = y.blocks::<L>(&boxes[2], &boxes[3]);
+            let reached = columns & rows;
+            if reached.bits() == 0 {
                 continue;
             }
-            let group = (eight * LANES) as u32;
-            for row in 0..BLOCKS as u32 {
-                let row_groups = rows >> (row * LANES as u32) & 0xff;
-                let mut found = columns & (row_groups * 0x0101_0101);
-                while found != 0 {
-                    let bit = found.trailing_zeros();
-                    found &= found - 1;
-                    let group = group + bit % LANES as u32;
-                    let block = row * BLOCKS as u32 + bit / LANES as u32;
-                    list.push(CellNumber { cell: block * groups + group, group });
+            let ranges = column_range + row_range * L::splat(BLOCKS as f32);
+            let ranges = reached.select(ranges, L::splat(NO_BLOCKS as f32)).whole();
+            for (lane, range) in ranges.into_iter().enumerate() {
+                let range = &BLOCK_RANGES[range as usize % BLOCK_RANGES.len()];
+                let first = ((eight * LANES + lane) * BLOCKS * BLOCKS) as u32;
+                // As many as there can be, without a branch; the next ones overwrite those that are too many.
+                if let Some(room) = list.get_mut(count..count + BLOCKS * BLOCKS) {
+                    for (cell, &block) in room.iter_mut().zip(&range.blocks) {
+                        *cell = first + u32::from(block);
+                    }
                 }
+                count += range.count as usize;
             }
         }
-        let near = [0, 1].map(|axis| self.nearness(image, axis, splat, corner));
-        self.keep_near::<L>(&near, list);
+        count
     }
 
-    /// Keeps those of some cells of which a sample is near a splat.
+    /// Keeps of the first `count` reached cells of a list those of which a sample is near a splat.
     #[inline(always)]
-    fn keep_near<L: Lanes>(&self, [x, y]: &[Nearness; 2], list: &mut Vec<CellNumber>) {
+    fn keep_near<L: Lanes>(&self, [x, y]: &[Nearness; 2], count: usize, list: &mut CellList) {
+        let (lenses, positions) = (self.lens.as_slice(), self.positions.as_slice());
+        let (reached, cells) = (&list.reached[..count], list.cells.as_mut_slice());
         let mut kept = 0;
-        for i in 0..list.len() {
-            let number = list[i];
-            let (position, lens) = (&self.positions[number.cell as usize], &self.lens[number.group as usize]);
-            let far = x.is_far(L::load(&position[0]), L::load(&lens[0]))
-                | y.is_far(L::load(&position[1]), L::load(&lens[1]));
+        for &cell in reached {
+            let [lens_x, lens_y] = &lenses[cell as usize / (BLOCKS * BLOCKS)];
+            let [position_x, position_y] = &positions[cell as usize];
+            let near = x.is_near(L::load(position_x), L::load(lens_x))
+                & y.is_near(L::load(position_y), L::load(lens_y));
             // Written in any case: which is kept cannot be foreseen.
-            list[kept] = number;
-            kept += usize::from(far.bits() as u8 != u8::MAX);
+            cells[kept] = cell;
+            kept += usize::from(near.bits() as u8 != 0);
         }
-        list.truncate(kept);
-    }
-
-    /// Where along an axis the samples are by which a splat may be hit.
-    #[inline(always)]
-    fn nearness(&self, image: &Image, axis: usize, splat: &VisibleSplat, corner: [i32; 2]) -> Nearness {
-        let center = [splat.constants.xi, splat.constants.yi];
-        let origin = f64::from(center[axis]) - f64::from(corner[axis]);
-        let [near, far] = image.defocus;
-        let defocus = 0.5 * (near + far);
-        let spread = self.lens_radius * 0.5 * (near - far).abs();
-        let [middle, half] =
-            [0.5 * (image.max[axis] + image.min[axis]) + origin, 0.5 * (image.max[axis] - image.min[axis])];
-        // Three roundings of terms that may cancel.
-        let rounding =
-            (middle.abs() + self.lens_radius * defocus.abs() + 64.0) * 4.0 * f64::from(f32::EPSILON);
-        Nearness { middle: middle as f32, half: (half + spread + rounding) as f32, defocus: defocus as f32 }
+        list.count = kept;
     }
 
     /// How far a splat reaches along an axis, for [`Reach::blocks`].
     #[inline(always)]
     fn reach(&self, image: &Image, axis: usize, splat: &VisibleSplat, corner: [i32; 2]) -> Reach {
-        let room = self.filter_radius + BOX_PADDING + 0.5;
+        let room = self.images.filter_radius + BOX_PADDING + 0.5;
         let center = [splat.constants.xi, splat.constants.yi];
         let origin = f64::from(center[axis]) - f64::from(corner[axis]);
         let [near, far] = image.defocus;
@@ -301,19 +288,10 @@ impl Lattice {
     /// Offset of a cell's samples from a splat, as the reference has it, and their lens points. `apart` is that of the
     /// tile's first pixel.
     #[inline(always)]
-    pub fn offset<L: Lanes>(
-        &self,
-        number: CellNumber,
-        apart: &Apart<L>,
-        minus_fraction: &[L; 2],
-    ) -> ([L; 2], [L; 2]) {
-        let Cell { pixel, jitter } = &self.cells[number.cell as usize];
-        let lens = &self.lens[number.group as usize];
-        let whole = match apart {
-            // The sum is exact, as its terms are.
-            Apart::Near([x, y]) => [*x + L::load(&pixel[0]), *y + L::load(&pixel[1])],
-            Apart::Far(apart) => far_offset(*apart, pixel),
-        };
+    pub fn offset<L: Lanes>(&self, cell: u32, apart: &Apart<L>, minus_fraction: &[L; 2]) -> ([L; 2], [L; 2]) {
+        let Cell { pixel, jitter } = &self.cells[cell as usize];
+        let lens = &self.lens[cell as usize / (BLOCKS * BLOCKS)];
+        let whole = apart.to([L::load(&pixel[0]), L::load(&pixel[1])]);
         (
             [
                 whole[0] + (L::load(&jitter[0]) + minus_fraction[0]),
@@ -323,48 +301,12 @@ impl Lattice {
         )
     }
 
-    /// Drops the hits of a cell whose pixels are not in a region of the tile.
+    /// Column and row in the tile of a cell's samples.
     #[inline(always)]
-    pub fn clip<L: Lanes>(&self, cell: u32, corner: [i32; 2], region: &PixelRect, hits: &mut LaneHits<L>) {
+    pub fn pixels<L: Lanes>(&self, cell: u32) -> [L; 2] {
         let Cell { pixel, .. } = &self.cells[cell as usize];
-        let (x, y) = (L::load(&pixel[0]), L::load(&pixel[1]));
-        let edge = |edge: i32, corner: i32| L::splat((edge - corner) as f32);
-        hits.missed = hits.missed
-            | x.less(edge(region.x0, corner[0]))
-            | x.not_less(edge(region.x1, corner[0]))
-            | y.less(edge(region.y0, corner[1]))
-            | y.not_less(edge(region.y1, corner[1]));
+        [L::load(&pixel[0]), L::load(&pixel[1])]
     }
-}
-
-/// How far the first pixel of a tile is from a splat's pixel.
-#[derive(Debug, Clone, Copy)]
-pub enum Apart<L> {
-    /// So near that offsets in the tile are exact sums.
-    Near([L; 2]),
-    /// So far that they have to be rounded as the reference does.
-    Far([i32; 2]),
-}
-
-impl<L: Lanes> Apart<L> {
-    /// From the splat's pixel to the tile's first.
-    #[inline(always)]
-    pub fn new(splat: &VisibleSplat, corner: [i32; 2]) -> Self {
-        let [x, y] = [corner[0] - splat.constants.xi, corner[1] - splat.constants.yi];
-        if x.unsigned_abs().max(y.unsigned_abs()) < 1 << 23 {
-            Self::Near([L::splat(x as f32), L::splat(y as f32)])
-        } else {
-            Self::Far([x, y])
-        }
-    }
-}
-
-/// What a pinhole sees of a splat, for [`Lattice`]: in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
-#[derive(Debug, Clone, Copy)]
-pub struct Image {
-    min: [f64; 2],
-    max: [f64; 2],
-    defocus: [f64; 2],
 }
 
 /// How far a splat reaches along an axis, in blocks from the tile's first.
@@ -377,50 +319,39 @@ struct Reach {
     spread: f32,
 }
 
-/// What is near a splat along an axis: samples within `half` of `middle` plus lens point times `defocus`, in pixels from the
-/// tile's first.
-struct Nearness {
-    middle: f32,
-    half: f32,
-    defocus: f32,
-}
-
-impl Nearness {
-    #[inline(always)]
-    fn is_far<L: Lanes>(&self, position: L, lens: L) -> L {
-        let offset = (position - L::splat(self.middle)) - lens * L::splat(self.defocus);
-        L::splat(self.half).less(offset.greatest(L::splat(0.0) - offset))
-    }
-}
-
 impl Reach {
-    /// The blocks 0 to 3 that a splat reaches through eight groups of lens points, given the middle and half the length of
-    /// their boxes: bit l + 8 b is set for block b and group l.
+    /// Whether a splat reaches any blocks through each of eight groups of lens points, given the middle and half the length of
+    /// their boxes; and the first, plus 16 times the last.
     #[inline(always)]
-    fn blocks<L: Lanes>(&self, middle: &Eight, half: &Eight) -> u32 {
+    fn blocks<L: Lanes>(&self, middle: &Eight, half: &Eight) -> (L, L) {
         let (middle, half) = (L::load(middle), L::load(half));
         let (defocus, spread) = (L::splat(self.defocus), L::splat(self.spread));
         let shift = middle * defocus;
-        let zero = L::splat(0.0);
+        let (zero, last) = (L::splat(0.0), L::splat((BLOCKS - 1) as f32));
         // (m +- h)(d +- s) lies within |m| s + h (|d| + s) of m d.
-        let around =
-            middle.greatest(zero - middle) * spread + half * L::splat(self.defocus.abs() + self.spread);
+        let around = magnitude(middle) * spread + half * L::splat(self.defocus.abs() + self.spread);
         let low = L::splat(self.min) + shift - around;
         let high = L::splat(self.max) + shift + around;
-        let mut blocks = 0;
-        for block in 0..BLOCKS {
-            let reached = low.less(L::splat(block as f32 + 1.0)) & L::splat(block as f32).less_or_equal(high);
-            blocks |= (reached.bits() & u32::from(u8::MAX)) << (block * LANES);
-        }
-        blocks
+        let reached = low.less(last + L::splat(1.0)) & zero.less_or_equal(high);
+        (reached, low.greatest(zero).round_down() + high.least(last).round_down() * L::splat(16.0))
     }
 }
 
-/// Offsets too large for exact sums: each rounded once, as the reference does.
-#[inline(never)]
-fn far_offset<L: Lanes>(apart: [i32; 2], pixel: &[Eight; 2]) -> [L; 2] {
-    let axis = |axis: usize| L::load(&pixel[axis].map(|pixel| (apart[axis] + pixel as i32) as f32));
-    [axis(0), axis(1)]
+/// The numbers without their signs.
+#[inline(always)]
+fn magnitude<L: Lanes>(numbers: L) -> L {
+    numbers.greatest(L::splat(0.0) - numbers)
+}
+
+/// The pixel of a tile, in one of its blocks, in which each lens pattern stands.
+fn pixels_of_patterns(table: &SampleTable, block: usize) -> [[i32; 2]; PATTERNS] {
+    let corner = [block % BLOCKS * BLOCK, block / BLOCKS * BLOCK];
+    let mut pixel_of = [[0; 2]; PATTERNS];
+    for i in 0..PATTERNS {
+        let [x, y] = [corner[0] + i % BLOCK, corner[1] + i / BLOCK].map(|coordinate| coordinate as i32);
+        pixel_of[table.patterns_of(x, y)[1]] = [x, y];
+    }
+    pixel_of
 }
 
 /// Orders lens points so that each eight in a row are neighbours: halves them along the longer side of their box, again and

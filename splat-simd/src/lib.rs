@@ -8,6 +8,8 @@ mod compare;
 mod evaluate;
 mod lanes;
 mod lattice;
+mod lens_image;
+mod lens_sums;
 mod over;
 mod places;
 mod raster;

@@ -1,5 +1,6 @@
 //! Which pixels of a tile a splat may be hit from, row by row.
 
+use crate::evaluate::LaneHits;
 use crate::lanes::{Eight, LANES, Lanes};
 use splat_core::PixelRect;
 use splat_core::setup::{BOX_PADDING, VisibleSplat};
@@ -177,6 +178,58 @@ impl<L: Lanes> RowSpans<L> {
         let square = ((one - height) * (one + height)).greatest(L::splat(0.0));
         self.half_width * (height * self.correlation + narrowing * square.square_root())
     }
+}
+
+/// How far the first pixel of a tile is from a splat's pixel.
+#[derive(Debug, Clone, Copy)]
+pub enum Apart<L> {
+    /// So near that offsets in the tile are exact sums.
+    Near([L; 2]),
+    /// So far that they have to be rounded as the reference does.
+    Far([i32; 2]),
+}
+
+impl<L: Lanes> Apart<L> {
+    /// From the splat's pixel to the tile's first.
+    #[inline(always)]
+    pub fn new(splat: &VisibleSplat, corner: [i32; 2]) -> Self {
+        let [x, y] = [corner[0] - splat.constants.xi, corner[1] - splat.constants.yi];
+        if x.unsigned_abs().max(y.unsigned_abs()) < 1 << 23 {
+            Self::Near([L::splat(x as f32), L::splat(y as f32)])
+        } else {
+            Self::Far([x, y])
+        }
+    }
+
+    /// From the splat's pixel to pixels of the tile.
+    #[inline(always)]
+    pub fn to(&self, [x, y]: [L; 2]) -> [L; 2] {
+        match self {
+            // The sums are exact, as their terms are.
+            Self::Near(apart) => [apart[0] + x, apart[1] + y],
+            Self::Far(apart) => {
+                let [x, y] = far_offset(*apart, [x.whole(), y.whole()]);
+                [L::load(&x), L::load(&y)]
+            }
+        }
+    }
+}
+
+/// Offsets too large for exact sums: each rounded once, as the reference does.
+#[inline(never)]
+fn far_offset(apart: [i32; 2], pixel: [[i32; LANES]; 2]) -> [Eight; 2] {
+    [0, 1].map(|axis| pixel[axis].map(|pixel| (apart[axis] + pixel) as f32))
+}
+
+/// Drops hits whose pixels (given by column and row in a tile, and the tile's first) are not in a region.
+#[inline(always)]
+pub fn clip<L: Lanes>([x, y]: [L; 2], corner: [i32; 2], region: &PixelRect, hits: &mut LaneHits<L>) {
+    let edge = |edge: i32, corner: i32| L::splat((edge - corner) as f32);
+    hits.missed = hits.missed
+        | x.less(edge(region.x0, corner[0]))
+        | x.not_less(edge(region.x1, corner[0]))
+        | y.less(edge(region.y0, corner[1]))
+        | y.not_less(edge(region.y1, corner[1]));
 }
 
 #[cfg(test)]

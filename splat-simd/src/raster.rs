@@ -2,8 +2,8 @@
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
 use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
-use crate::lattice::{Apart, CellNumber, Image, Lattice};
-use crate::places::{PLACES, PlaceList, TILE};
+use crate::lattice::{CellList, Lattice};
+use crate::places::{Apart, PLACES, PlaceList, TILE, clip as clip_hits};
 use crate::records::{Key, Page, Record, RecordBuffer, cell_of};
 use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
 use crate::surface_sums::SurfaceSums;
@@ -11,10 +11,11 @@ use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
 use splat_core::kernel::{KernelTable, Polynomials};
 use splat_core::raster::{Form, Rasterizer};
+use splat_core::render::Frame;
 use splat_core::setup::VisibleSplat;
 
 /// How many splats ahead of the one at work the next ones are fetched.
-const AHEAD: usize = 6;
+pub const AHEAD: usize = 6;
 
 /// What is the same for all regions of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +30,19 @@ pub struct RasterFrame<'a> {
     pub surfaces: &'a [SplatSurface],
     /// Radius of the pixel filter, in pixels.
     pub filter_radius: f32,
+}
+
+impl<'a> RasterFrame<'a> {
+    /// A frame with its samples in lanes.
+    pub fn new(frame: &'a Frame, samples: &'a LaneSamples) -> Self {
+        Self {
+            rasterizer: &frame.rasterizer,
+            samples,
+            splats: &frame.set_up.splats,
+            surfaces: &frame.set_up.surfaces,
+            filter_radius: frame.view.filter_radius as f32,
+        }
+    }
 }
 
 /// Rasterises some splats over a region, which lies within one tile, until the buffer takes no more. Gives the number of
@@ -67,16 +81,7 @@ impl Kernel for RasterJob<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> u64 {
-        // A copy of the loop for each form of the evaluation and each way to read the table: nothing is decided inside.
-        let table = self.frame.rasterizer.table();
-        match table.polynomials() {
-            None => self.with_table::<L, _>(table),
-            Some(polynomials) => match polynomials.degree {
-                2 => self.with_table::<L, _>(&OfDegree::<2>(polynomials)),
-                3 => self.with_table::<L, _>(&OfDegree::<3>(polynomials)),
-                _ => self.with_table::<L, _>(&OfDegree::<4>(polynomials)),
-            },
-        }
+        with_table::<L, _>(self.frame.rasterizer.table(), self)
     }
 }
 
@@ -103,9 +108,11 @@ const ANY_SIDE: u8 = 0;
 const SAME_SIDE: u8 = 1;
 const OTHER_SIDE: u8 = 2;
 
-impl RasterJob<'_> {
+impl TableKernel for RasterJob<'_> {
+    type Output = u64;
+
     #[inline(always)]
-    fn with_table<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
+    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
         match (self.frame.rasterizer.form(), self.distorted.is_empty()) {
             (Form::Pinhole, true) => self.rasterize::<L, T, PINHOLE>(table),
             (Form::ThinLens, true) => self.rasterize::<L, T, THIN_LENS>(table),
@@ -114,7 +121,9 @@ impl RasterJob<'_> {
             (Form::Orthographic, _) => self.rasterize::<L, T, ORTHOGRAPHIC>(table),
         }
     }
+}
 
+impl RasterJob<'_> {
     #[inline(always)]
     fn rasterize<L: Lanes, T: LaneTable, const FORM: u8>(self, table: &T) -> u64 {
         let Self { frame, ranks, region, records, places, distorted, mut target } = self;
@@ -155,16 +164,12 @@ pub struct LatticeJob<'a> {
     pub lattice: &'a Lattice,
     /// As [`RasterJob::ranks`].
     pub ranks: &'a [u32],
-    /// The image of each of these splats, as [`Lattice::image`] has it.
-    pub images: &'a [Option<Image>],
     /// The pixels; they lie within one tile.
     pub region: PixelRect,
     /// Where the fragments go.
     pub records: &'a mut RecordBuffer,
     /// Scratch.
-    pub cells: &'a mut Vec<CellNumber>,
-    /// As [`RasterJob::target`].
-    pub target: Target<'a>,
+    pub cells: &'a mut CellList,
 }
 
 impl Kernel for LatticeJob<'_> {
@@ -172,67 +177,63 @@ impl Kernel for LatticeJob<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> u64 {
-        let table = self.frame.rasterizer.table();
-        match table.polynomials() {
-            None => self.rasterize::<L, _>(table),
-            Some(polynomials) => match polynomials.degree {
-                2 => self.rasterize::<L, _>(&OfDegree::<2>(polynomials)),
-                3 => self.rasterize::<L, _>(&OfDegree::<3>(polynomials)),
-                _ => self.rasterize::<L, _>(&OfDegree::<4>(polynomials)),
-            },
-        }
+        with_table::<L, _>(self.frame.rasterizer.table(), self)
     }
 }
 
-impl LatticeJob<'_> {
+impl TableKernel for LatticeJob<'_> {
+    type Output = u64;
+
     #[inline(always)]
-    fn rasterize<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
-        let Self { frame, lattice, ranks, images, region, records, cells, mut target } = self;
+    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
+        let Self { frame, lattice, ranks, region, records, cells } = self;
         let corner = [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)];
         let partial = region.area() < PLACES;
         let mut tests = 0;
-        for (i, (&rank, image)) in ranks.iter().zip(images).enumerate() {
+        for (i, &rank) in ranks.iter().enumerate() {
             if let Some(&next) = ranks.get(i + AHEAD) {
                 prefetch(&frame.splats[next as usize]);
                 prefetch(&frame.surfaces[next as usize]);
             }
             let splat = &frame.splats[rank as usize];
-            lattice.list::<L>(splat, image.as_ref(), corner, cells);
-            if let Target::Layered(sums) = &target {
-                cells.retain(|number| sums.is_layered(number.cell as usize));
-            }
+            lattice.list::<L>(splat, corner, cells);
             let surface = &frame.surfaces[rank as usize];
-            let Some(mut page) = records.begin(rank, surface, cells.len()) else { break };
-            tests += (cells.len() * LANES) as u64;
+            let Some(mut page) = records.begin(rank, surface, cells.cells().len()) else { break };
+            tests += (cells.cells().len() * LANES) as u64;
             let clip = partial.then_some(&region);
             let splat = Evaluation::<L, T>::new(&frame, splat, table);
             if splat.splat.plain {
-                splat.rasterize_cells::<true>(lattice, cells, corner, clip, &mut page);
+                splat.rasterize_cells::<true>(lattice, cells.cells(), corner, clip, &mut page);
             } else {
-                splat.rasterize_cells::<false>(lattice, cells, corner, clip, &mut page);
+                splat.rasterize_cells::<false>(lattice, cells.cells(), corner, clip, &mut page);
             }
-            splat.finish(page, surface, &mut target);
+            splat.finish(page, surface, &mut Target::Records);
         }
         tests
     }
 }
 
 /// A splat ready to be evaluated in a frame.
-struct Evaluation<'a, L, T> {
+pub struct Evaluation<'a, L, T> {
     samples: &'a LaneSamples,
-    splat: &'a VisibleSplat,
+    /// The splat.
+    pub splat: &'a VisibleSplat,
     table: &'a T,
-    culls: bool,
-    lane_splat: LaneSplat<L>,
-    limits: LaneLimits<L>,
-    /// Added: that can come from memory.
-    minus_fraction: [L; 2],
+    /// Whether backs are not drawn.
+    pub culls: bool,
+    /// The splat in lanes.
+    pub lane_splat: LaneSplat<L>,
+    /// What is a hit.
+    pub limits: LaneLimits<L>,
+    /// Minus the fraction of the splat's position. (Added: that can come from memory.)
+    pub minus_fraction: [L; 2],
     weight_scale: L,
 }
 
 impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
+    /// A splat of a frame.
     #[inline(always)]
-    fn new(frame: &RasterFrame<'a>, splat: &'a VisibleSplat, table: &'a T) -> Self {
+    pub fn new(frame: &RasterFrame<'a>, splat: &'a VisibleSplat, table: &'a T) -> Self {
         Self {
             samples: frame.samples,
             splat,
@@ -274,7 +275,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     fn rasterize_cells<const PLAIN: bool>(
         &self,
         lattice: &Lattice,
-        cells: &[CellNumber],
+        cells: &[u32],
         corner: [i32; 2],
         clip: Option<&PixelRect>,
         page: &mut Page<'_>,
@@ -283,31 +284,26 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         let ordinary = clip.is_none() && !self.splat.flips && matches!(apart, Apart::Near(_));
         if ordinary {
             if !(self.culls && self.splat.back) {
-                for &number in cells {
-                    let hits = self.cell_hits::<PLAIN>(lattice, number, &apart);
-                    page.put(number.cell, self.splat.back, &hits);
+                for &cell in cells {
+                    let hits = self.cell_hits::<PLAIN>(lattice, cell, &apart);
+                    page.put(cell, self.splat.back, &hits);
                 }
             }
         } else {
-            for &number in cells {
-                let mut hits = self.cell_hits::<PLAIN>(lattice, number, &apart);
+            for &cell in cells {
+                let mut hits = self.cell_hits::<PLAIN>(lattice, cell, &apart);
                 if let Some(region) = clip {
-                    lattice.clip(number.cell, corner, region, &mut hits);
+                    clip_hits(lattice.pixels(cell), corner, region, &mut hits);
                 }
-                self.put_sides(number.cell, hits, page);
+                self.put_sides(cell, hits, page);
             }
         }
     }
 
     /// The hits in a cell of a lattice.
     #[inline(always)]
-    fn cell_hits<const PLAIN: bool>(
-        &self,
-        lattice: &Lattice,
-        number: CellNumber,
-        apart: &Apart<L>,
-    ) -> LaneHits<L> {
-        let (d, p) = lattice.offset(number, apart, &self.minus_fraction);
+    fn cell_hits<const PLAIN: bool>(&self, lattice: &Lattice, cell: u32, apart: &Apart<L>) -> LaneHits<L> {
+        let (d, p) = lattice.offset(cell, apart, &self.minus_fraction);
         self.lane_splat.thin_lens::<PLAIN>(d, p, &self.limits)
     }
 
@@ -394,7 +390,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Not at once where the hits are found: this way neither loop is so long that the processor sees only one cell of it
     /// at a time.
     #[inline(always)]
-    fn weigh(&self, records: &mut [Record]) -> u32 {
+    pub fn weigh(&self, records: &mut [Record]) -> u32 {
         let count = records.len();
         let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks_mut::<2>();
@@ -430,7 +426,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
 
     /// Depth and weight, given depths (not numbers where there is none) and r2. Adds to `misses` where there is none.
     #[inline(always)]
-    fn weighed(&self, depth: L, r2: L, misses: &mut L) -> (L, L) {
+    pub fn weighed(&self, depth: L, r2: L, misses: &mut L) -> (L, L) {
         let missed = depth.not_less_or_equal(L::splat(f32::INFINITY));
         let weight = self.weight_scale * self.table.kernel(r2, missed);
         let missed = missed | L::splat(0.0).not_less(weight);
@@ -555,8 +551,30 @@ impl Source<'_> {
     }
 }
 
+/// A computation over lanes and a table of the kernel.
+pub trait TableKernel {
+    /// What it gives.
+    type Output;
+
+    /// Runs it; see [`Kernel::run`].
+    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> Self::Output;
+}
+
+/// Runs one with a table: there is a copy of it for each way to read one, so that nothing is decided inside.
+#[inline(always)]
+pub fn with_table<L: Lanes, K: TableKernel>(table: &KernelTable, kernel: K) -> K::Output {
+    match table.polynomials() {
+        None => kernel.run::<L, _>(table),
+        Some(polynomials) => match polynomials.degree {
+            2 => kernel.run::<L, _>(&OfDegree::<2>(polynomials)),
+            3 => kernel.run::<L, _>(&OfDegree::<3>(polynomials)),
+            _ => kernel.run::<L, _>(&OfDegree::<4>(polynomials)),
+        },
+    }
+}
+
 /// A table of the kernel that lanes can read.
-trait LaneTable {
+pub trait LaneTable {
     /// [`KernelTable::weight`] for a sample a lane; arbitrary where `missed` is set.
     fn kernel<L: Lanes>(&self, r2: L, missed: L) -> L;
 }

@@ -1,7 +1,9 @@
 //! The fast renderer: set-up and tiles in parallel, eight samples a vector.
 
 use crate::lanes::{LANES, Level};
-use crate::lattice::{CellNumber, Image, Lattice};
+use crate::lattice::{CellList, Lattice};
+use crate::lens_image::LensImages;
+use crate::lens_sums::{LensSamples, LensSums, LensSumsJob};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
@@ -16,7 +18,7 @@ use splat_core::memory::Budget;
 use splat_core::pixel::PixelResolver;
 use splat_core::raster::SamplePlace;
 use splat_core::render::{Frame, Tiles, Unfinished, pixel_too_large, quarters};
-use splat_core::setup::{Dropped, SetUp, SortKey, View, sort_keys, splat_order};
+use splat_core::setup::{Dropped, SetUp, SortKey, View, VisibleSplat, sort_keys, splat_order};
 use splat_core::shade::SplatShader;
 use splat_core::{AovSelection, Camera, Cloud, Error, Film, PixelRect, RenderOptions, Rendered, Statistics};
 use std::sync::Mutex;
@@ -35,13 +37,20 @@ const SET_UP_PARTS: usize = 16;
 const TILES_A_REPORT: usize = 16;
 
 /// At most so many bytes a sample of a pixel take the buffers of a thread besides the records.
-const WORKER_BYTES: usize = (32 << 10) + PLACES * SurfaceSums::BYTES_PER_CELL / LANES;
+const WORKER_BYTES: usize =
+    (32 << 10) + PLACES * (SurfaceSums::BYTES_PER_CELL / LANES + LensSums::BYTES_PER_SAMPLE);
 
-/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, what its fragments share, and its image.
-const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>() + size_of::<Option<Image>>());
+/// Bytes that each of a tile's splats takes, in arrays that grow by doubling: its rank, and what its fragments share.
+const LISTED_BYTES: usize = 2 * (size_of::<u32>() + size_of::<SplatSurface>());
 
 /// The same for its shader.
 const SHADED_BYTES: usize = 1024;
+
+/// Bytes that the samples of a frame with a lens take in all their orders, at most, if they take no more in one.
+const MAX_ORDER_BYTES: usize = 16 << 20;
+
+/// By at least as many of a tile's splats, if it has them, is chosen how it is rasterised.
+const SPLATS_ASKED: usize = 32;
 
 /// If more of a tile's cells than this hold several layers, sums are not worth their while: such cells are rasterised
 /// twice.
@@ -68,12 +77,12 @@ struct Worker {
     records: RecordBuffer,
     places: PlaceList,
     distorted: DistortedSamples,
-    images: Vec<Option<Image>>,
-    cells: Vec<CellNumber>,
+    cells: CellList,
     colors: Vec<SampleColor>,
     fragments: Vec<Fragment>,
     over: Over,
     sums: SurfaceSums,
+    lens_sums: LensSums,
     /// The part of the last tile's cells that held several layers.
     layered_share: f32,
 }
@@ -101,6 +110,10 @@ struct Picture<'a> {
     samples: LaneSamples,
     /// For large circles of confusion.
     lattice: Option<Lattice>,
+    /// The same, for surfaces that are summed.
+    lens_samples: Option<LensSamples>,
+    /// Whether surfaces may be known by sums alone.
+    can_sum: bool,
     images: &'a LaneImages,
     level: Level,
     /// Bytes that the fragments of a tile may take.
@@ -322,11 +335,18 @@ impl<'a> Picture<'a> {
         // while they move.
         let films = 2 * TILES_A_REPORT * PLACES * options.film_bytes_per_pixel();
         let others = WORKER_BYTES * options.samples as usize + films;
-        let share = (memory.left() / renderer.threads()).saturating_sub(others) / 5;
+        let orders = MAX_ORDER_BYTES.min(memory.left() / 16);
+        let share = (memory.left().saturating_sub(orders) / renderer.threads()).saturating_sub(others) / 5;
         let samples = LaneSamples::new(&frame.rasterizer);
         // Of a cell of a lattice every sample lies in another pixel.
         let by_pixel = options.material.varies_by_pixel();
-        let lattice = Lattice::new(&frame.rasterizer, &frame.view).filter(|_| !by_pixel);
+        let lens_images = LensImages::new(&frame.view).filter(|_| !by_pixel);
+        let lattice = lens_images.map(|images| Lattice::new(&frame.rasterizer, images));
+        let can_sum = can_sum(cloud, options, samples.groups());
+        let lens_samples = lens_images.filter(|_| can_sum).map(|images| {
+            let defocus = images.defocus_range(&frame.set_up.splats);
+            renderer.threads.install(|| LensSamples::new(&frame.rasterizer, images, defocus, orders))
+        });
         Self {
             cloud,
             camera,
@@ -334,6 +354,8 @@ impl<'a> Picture<'a> {
             frame,
             samples,
             lattice,
+            lens_samples,
+            can_sum,
             images,
             level,
             tile_memory: options.tile_memory.min(share),
@@ -369,61 +391,64 @@ impl<'a> Picture<'a> {
     /// Makes the fragments of a tile and forgets them.
     fn count(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Statistics {
         let start = Instant::now();
-        worker.records.clear(self.samples.groups(), self.two_sided(), usize::MAX);
+        worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), usize::MAX);
         worker.records.forget();
         worker.distorted.fill(&self.frame.rasterizer, region, self.level);
-        let lattice = self.lattice_for(region, ranks, &mut worker.images);
-        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
+        let lattice = self.lattice_for(region, ranks);
+        let tests = self.rasterize(worker, region, ranks, lattice);
         let fragments = worker.records.fragments;
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 
     /// The lattice, if by it these splats have less to test in a region than pixel by pixel.
-    fn lattice_for(
-        &self,
-        region: &PixelRect,
-        ranks: &[u32],
-        images: &mut Vec<Option<Image>>,
-    ) -> Option<&Lattice> {
+    fn lattice_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&Lattice> {
         // A lattice's cells spread over the tile, whatever small part of it is asked for.
         let lattice = self.lattice.as_ref().filter(|_| region.area() >= PLACES / 2)?;
-        let splats = ranks.iter().map(|&rank| &self.frame.set_up.splats[rank as usize]);
-        images.clear();
-        images.extend(splats.clone().map(|splat| lattice.image(splat)));
-        let gain: f64 =
-            splats.zip(&*images).map(|(splat, image)| lattice.gain(splat, image.as_ref(), region)).sum();
+        let gain: f64 = self.some_splats(ranks).map(|splat| lattice.gain(splat, region)).sum();
         (gain > 0.0).then_some(lattice)
     }
 
-    /// Makes the fragments of a region. Returns the number of samples tested.
+    /// The samples by lens points, if it takes less time to sum these splats by them than pixel by pixel.
+    fn lens_samples_for(&self, region: &PixelRect, ranks: &[u32]) -> Option<&LensSamples> {
+        let samples = self.lens_samples.as_ref().filter(|_| region.area() >= PLACES / 2)?;
+        let gain: f64 = self.some_splats(ranks).map(|splat| samples.gain(splat, region)).sum();
+        (gain > 0.0).then_some(samples)
+    }
+
+    /// A part of some splats, to tell what is better for all.
+    fn some_splats(&self, ranks: &[u32]) -> impl Iterator<Item = &VisibleSplat> {
+        ranks
+            .iter()
+            .step_by(ranks.len() / SPLATS_ASKED + 1)
+            .map(|&rank| &self.frame.set_up.splats[rank as usize])
+    }
+
+    /// Makes the records of a region. Returns the number of samples tested.
     fn rasterize(
         &self,
         worker: &mut Worker,
         region: &PixelRect,
         ranks: &[u32],
         lattice: Option<&Lattice>,
-        keep: Keep,
     ) -> u64 {
-        let Worker { records, places, distorted, images, cells, sums, .. } = worker;
+        let Some(lattice) = lattice else {
+            return self.rasterize_pixels(worker, region, ranks, Keep::Records);
+        };
+        let Worker { records, cells, .. } = worker;
+        let (frame, region) = (self.raster_frame(), *region);
+        self.level.run_single(LatticeJob { frame, lattice, ranks, region, records, cells })
+    }
+
+    /// Makes the fragments of a region pixel by pixel. Returns the number of samples tested.
+    fn rasterize_pixels(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32], keep: Keep) -> u64 {
+        let Worker { records, places, distorted, sums, .. } = worker;
         let (frame, region) = (self.raster_frame(), *region);
         let target = match keep {
             Keep::Records => Target::Records,
             Keep::Sums => Target::Sums(sums),
             Keep::Layered => Target::Layered(sums),
         };
-        match lattice {
-            None => self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target }),
-            Some(lattice) => self.level.run_single(LatticeJob {
-                frame,
-                lattice,
-                ranks,
-                images,
-                region,
-                records,
-                cells,
-                target,
-            }),
-        }
+        self.level.run(RasterJob { frame, ranks, region, records, places, distorted, target })
     }
 
     /// Renders a part of a tile, in quarters if its records exceed the budget; a single pixel gets what it needs, if there is as
@@ -448,15 +473,16 @@ impl<'a> Picture<'a> {
             return quarters(region)
                 .try_for_each(|quarter| self.region(worker, &quarter, ranks, pixels, film, statistics));
         }
-        let lattice = self.lattice_for(region, ranks, &mut worker.images);
-        let summed = self.can_sum() && worker.layered_share < MOST_LAYERED;
+        let summed = self.can_sum && worker.layered_share < MOST_LAYERED;
+        // Sums are of cells of pixels.
+        let lattice = if summed { None } else { self.lattice_for(region, ranks) };
         let (tests, fragments) = if summed {
-            self.sum_surfaces(worker, region, ranks, lattice, limit)
+            self.sum_surfaces(worker, region, ranks, limit)
         } else {
             // So that sums are tried again in a while.
             worker.layered_share *= 0.9;
-            worker.records.clear(self.samples.groups(), self.two_sided(), limit);
-            let tests = self.rasterize(worker, region, ranks, lattice, Keep::Records);
+            worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), limit);
+            let tests = self.rasterize(worker, region, ranks, lattice);
             (tests, worker.records.fragments)
         };
         if !worker.records.is_complete() {
@@ -522,38 +548,39 @@ impl<'a> Picture<'a> {
         worker: &mut Worker,
         region: &PixelRect,
         ranks: &[u32],
-        lattice: Option<&Lattice>,
         limit: usize,
     ) -> (u64, u64) {
         let groups = self.samples.groups();
         worker.sums.prepare(groups);
         worker.records.clear(groups, false, usize::MAX);
         worker.records.forget();
-        let tests = self.rasterize(worker, region, ranks, lattice, Keep::Sums);
-        let fragments = worker.records.fragments;
-        let [layered, hit] =
-            self.level.run_single(FindLayered { sums: &mut worker.sums, by_pixel: lattice.is_none() });
+        let [tests, fragments] = match self.lens_samples_for(region, ranks) {
+            Some(samples) => self.sum_samples(worker, region, ranks, samples),
+            None => {
+                let tests = self.rasterize_pixels(worker, region, ranks, Keep::Sums);
+                [tests, worker.records.fragments]
+            }
+        };
+        let [layered, hit] = self.level.run_single(FindLayered { sums: &mut worker.sums });
         worker.layered_share = layered as f32 / hit.max(1) as f32;
         worker.records.clear(groups, false, limit);
         if layered > 0 {
-            self.rasterize(worker, region, ranks, lattice, Keep::Layered);
+            self.rasterize_pixels(worker, region, ranks, Keep::Layered);
         }
         (tests, fragments)
     }
 
-    /// Whether the surfaces of a cell may be known by sums alone.
-    fn can_sum(&self) -> bool {
-        matches!(self.options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. })
-            && few(self.options.aovs)
-            && self.cloud.opacities.is_none()
-            && !self.options.material.varies_by_pixel()
-            && !self.two_sided()
-            && self.samples.groups() <= MOST_SUMMED
-    }
-
-    /// Whether both sides of a splat can be seen, and are not the same to the resolve.
-    fn two_sided(&self) -> bool {
-        self.cloud.oriented && !self.options.cull && self.options.resolve != Resolve::Over
+    /// Sums the surfaces of a region by lens points. Returns the number of samples tested and that of fragments.
+    fn sum_samples(
+        &self,
+        worker: &mut Worker,
+        region: &PixelRect,
+        ranks: &[u32],
+        samples: &LensSamples,
+    ) -> [u64; 2] {
+        let Worker { sums, lens_sums: buffers, .. } = worker;
+        let (frame, region) = (self.raster_frame(), *region);
+        self.level.run_single(LensSumsJob { frame, samples, ranks, region, buffers, sums })
     }
 
     /// If colours differ from pixel to pixel, the shader for a tile.
@@ -567,13 +594,7 @@ impl<'a> Picture<'a> {
     }
 
     fn raster_frame(&self) -> RasterFrame<'_> {
-        RasterFrame {
-            rasterizer: &self.frame.rasterizer,
-            samples: &self.samples,
-            splats: &self.frame.set_up.splats,
-            surfaces: &self.frame.set_up.surfaces,
-            filter_radius: self.frame.view.filter_radius as f32,
-        }
+        RasterFrame::new(self.frame, &self.samples)
     }
 
     /// Resolves eight samples at once, by `cells`.
@@ -632,6 +653,21 @@ impl<'a> Picture<'a> {
             }
         }
     }
+}
+
+/// Whether the surfaces of a picture of so many groups of samples a pixel may be known by sums alone.
+fn can_sum(cloud: &Cloud, options: &RenderOptions, groups: usize) -> bool {
+    matches!(options.resolve, Resolve::Surface { thickness: Thickness::AroundHit, .. })
+        && few(options.aovs)
+        && cloud.opacities.is_none()
+        && !options.material.varies_by_pixel()
+        && !two_sided(cloud, options)
+        && groups <= MOST_SUMMED
+}
+
+/// Whether both sides of a splat can be seen, and are not the same to the resolve.
+fn two_sided(cloud: &Cloud, options: &RenderOptions) -> bool {
+    cloud.oriented && !options.cull && options.resolve != Resolve::Over
 }
 
 /// Whether the AOVs need no more of a sample than its colour, transmittance and coverage.

@@ -6,6 +6,7 @@
 //! the end. The few that did not are rasterised again, into records.
 
 use crate::lanes::{Eight, Kernel, LANES, Lanes};
+use crate::lens_sums::SampleSums;
 use crate::places::PLACES;
 use crate::records::cell_of;
 use crate::resolve::{Sums, interval};
@@ -85,6 +86,28 @@ impl SurfaceSums {
         }
     }
 
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Takes the sums of the samples of all cells, which lose them.
+    pub fn take_samples(&mut self, samples: &mut [SampleSums]) {
+        let (samples, _) = samples.as_chunks_mut::<LANES>();
+        for (cell, samples) in self.cells.iter_mut().zip(samples) {
+            for (lane, sample) in samples.iter_mut().enumerate().filter(|(_, sample)| !sample.is_empty()) {
+                let [red, green, blue, weight, last_near, first_far, ..] = sample.0;
+                for (to, color) in cell.weight_color.iter_mut().zip([red, green, blue]) {
+                    to[lane] = color;
+                }
+                cell.weight[lane] = weight;
+                cell.last_near[lane] = last_near;
+                cell.first_far[lane] = first_far;
+                *sample = SampleSums::EMPTY;
+            }
+        }
+    }
+
     /// Whether a cell holds several layers. The cells of a pixel do so together.
     #[inline(always)]
     pub fn is_layered(&self, cell: usize) -> bool {
@@ -111,13 +134,11 @@ impl SurfaceSums {
     }
 }
 
-/// Finds the cells that hold several layers, and empties them. Gives their number, and that of the cells that were hit.
+/// Finds the cells that hold several layers, all of a pixel together, and empties them. Gives their number, and that of the cells that were hit.
 #[derive(Debug)]
 pub struct FindLayered<'a> {
     /// The sums of a tile.
     pub sums: &'a mut SurfaceSums,
-    /// Whether cells are groups of samples of a pixel: then all of a pixel are found together.
-    pub by_pixel: bool,
 }
 
 impl Kernel for FindLayered<'_> {
@@ -136,12 +157,10 @@ impl Kernel for FindLayered<'_> {
         if !found {
             return [0, hit];
         }
-        if self.by_pixel {
-            let groups = layered.len() / PLACES;
-            for place in 0..PLACES as u16 {
-                let any = (0..groups).any(|group| layered[cell_of(place, group)]);
-                (0..groups).for_each(|group| layered[cell_of(place, group)] = any);
-            }
+        let groups = layered.len() / PLACES;
+        for place in 0..PLACES as u16 {
+            let any = (0..groups).any(|group| layered[cell_of(place, group)]);
+            (0..groups).for_each(|group| layered[cell_of(place, group)] = any);
         }
         for (sums, _) in cells.iter_mut().zip(&*layered).filter(|(_, layered)| **layered) {
             *sums = CellSums::EMPTY;

@@ -628,6 +628,38 @@ fn large_circles_of_confusion_agree() {
     assert!(another > 8, "{another} of {} were drawn by lens points", one_way + another);
 }
 
+/// Surfaces of one side, out of focus: they are summed sample by sample.
+#[test]
+fn blurred_surfaces_agree() {
+    let counts = RefCell::new([0; 2]);
+    let lens = (0.1..0.6, prop_oneof![0.3..1.0, 2.0..6.0, 8.0..40.0, Just(f64::INFINITY)]);
+    let coverage = prop_oneof![Just(OPAQUE), Just(soft(1.0)), Just(soft(0.5)), Just(soft(8.0))];
+    let memory = prop_oneof![Just(1usize), Just(20_000), Just(64 << 20)];
+    // A cloud without a side is seen from both; of others the backs are left out.
+    let case = (0u64..1_000_000, lens, options(), (coverage, memory), (any::<bool>(), 0.002..0.02));
+    check(32, 7, case, |(seed, (radius, focus), options, (resolve, memory), (oriented, size))| {
+        let mut cloud = jumble(200, size, seed);
+        cloud.opacities = None;
+        cloud.oriented = oriented;
+        let camera = with_lens(pinhole(100, 70, 150.0), Lens { radius, focus, blades: 0 });
+        let aovs = AovSelection { coverage: true, variance: true, ..AovSelection::default() };
+        let aovs = [AovSelection::default(), aovs][seed as usize % 2];
+        let thickness = if seed % 5 == 0 { 1e200 } else { options.thickness };
+        let options = RenderOptions { resolve, aovs, thickness, cull: true, ..options };
+        check_pictures(&cloud, &camera, &options, &[1 + seed as usize % 3], &[memory, memory]);
+        let level = Level::Portable;
+        let by_pixels =
+            splat_simd::fragments(&cloud, &camera, &options, level, Method::Pixels, &mut |_, _, _| {})
+                .unwrap();
+        let options = RenderOptions { tile_memory: 64 << 20, ..options };
+        let mut renderer = Renderer::new(1, level).unwrap();
+        let tests = renderer.render(&cloud, &camera, &options, &mut |_| {}).unwrap().statistics.tests;
+        counts.borrow_mut()[usize::from(tests < by_pixels)] += 1;
+    });
+    let [one_way, another] = counts.into_inner();
+    assert!(another > 8, "{another} of {} were drawn sample by sample", one_way + another);
+}
+
 // ---------------------------------------------------------------------------------------------------------
 // Many layers
 

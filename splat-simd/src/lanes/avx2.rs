@@ -6,7 +6,7 @@
 
 #![expect(unsafe_code, reason = "intrinsics; see the module's documentation")]
 
-use super::{Eight, Kernel, LANES, Lanes};
+use super::{Eight, Kernel, LANES, Lanes, SET_BITS};
 use std::arch::is_x86_feature_detected;
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -225,6 +225,15 @@ impl Lanes for Avx2 {
         unsafe {
             let low = _mm256_castps128_ps256(_mm_loadu_ps(a.as_ptr()));
             Self(_mm256_insertf128_ps::<1>(low, _mm_loadu_ps(b.as_ptr())))
+        }
+    }
+
+    #[inline(always)]
+    fn pack(self, lanes: u8) -> Self {
+        // SAFETY: see the module's documentation; the array is as long as half of a register of 128 bits.
+        unsafe {
+            let numbers = _mm_loadl_epi64(SET_BITS[usize::from(lanes)].as_ptr().cast());
+            Self(_mm256_permutevar8x32_ps(self.0, _mm256_cvtepu8_epi32(numbers)))
         }
     }
 

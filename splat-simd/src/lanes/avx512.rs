@@ -233,6 +233,11 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    fn pack(self, lanes: u8) -> Self {
+        Self::twice(self.first_cell().pack(lanes))
+    }
+
+    #[inline(always)]
     fn whole(self) -> [i32; LANES] {
         self.first_cell().whole()
     }

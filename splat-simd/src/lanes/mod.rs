@@ -101,6 +101,9 @@ pub trait Lanes:
     /// Four values and another four, in each cell.
     fn load_halves(halves: [&[f32; 4]; 2]) -> Self;
 
+    /// The lanes of the first cell of which a bit is set, one after the other, in each cell; what follows is arbitrary.
+    fn pack(self, lanes: u8) -> Self;
+
     /// The lanes of the first cell without their fractions, for lanes whose magnitude is below 2^31; arbitrary for others.
     fn whole(self) -> [i32; LANES];
 
@@ -113,6 +116,24 @@ pub trait Lanes:
         Self::load_cells(values, values)
     }
 }
+
+/// For each byte the numbers of the bits that are set in it, the lowest first.
+const SET_BITS: [[u8; LANES]; 256] = {
+    let mut table = [[0; LANES]; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut count, mut bit) = (0, 0);
+        while bit < LANES {
+            if byte >> bit & 1 == 1 {
+                table[byte][count] = bit as u8;
+                count += 1;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    table
+};
 
 /// A computation over lanes of any kind.
 pub trait Kernel {

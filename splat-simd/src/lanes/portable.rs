@@ -1,6 +1,6 @@
 //! Lanes of `wide`: as good as the instruction set that the program was compiled for, on any machine.
 
-use super::{Eight, LANES, Lanes};
+use super::{Eight, LANES, Lanes, SET_BITS};
 use wide::f32x8;
 
 impl Lanes for f32x8 {
@@ -116,6 +116,12 @@ impl Lanes for f32x8 {
     #[inline(always)]
     fn load_halves([[a, b, c, d], [e, f, g, h]]: [&[f32; 4]; 2]) -> Self {
         Self::new([*a, *b, *c, *d, *e, *f, *g, *h])
+    }
+
+    #[inline(always)]
+    fn pack(self, lanes: u8) -> Self {
+        let values = self.to_array();
+        Self::new(SET_BITS[usize::from(lanes)].map(|lane| values[usize::from(lane) % LANES]))
     }
 
     #[inline(always)]

@@ -171,6 +171,12 @@ impl Kernel for CheckPair {
         let halves = [[x[1], x[2], x[3], x[4]], [y[3], y[2], y[1], y[0]]];
         let found = lanes(L::load_halves([&halves[0], &halves[1]]));
         check("load of halves", &found, |i| halves[i % LANES / 4][i % 4]);
+        let set = (x[0].to_bits() ^ y[0].to_bits() >> 9) as u8;
+        let packed = lanes(a.pack(set));
+        let kept: Vec<f32> = (0..LANES).filter(|lane| set >> lane & 1 == 1).map(|lane| x[lane]).collect();
+        for cell in packed.chunks(LANES) {
+            check("pack", &cell[..kept.len()], |i| kept[i]);
+        }
         let sums = L::sums([a, b, L::splat(0.25), b]);
         let sum = |x: &[f32]| ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
         check("sums", &sums, |i| [sum(&x), sum(&y), 2.0, sum(&y)][i]);
