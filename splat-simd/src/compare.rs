@@ -87,10 +87,11 @@ impl<'a> SplatBySplat<'a> {
     /// Finds the fragments of a splat in a region of a tile sample by sample. Returns the number of samples tested.
     fn hit(&mut self, rank: usize, region: PixelRect) -> u64 {
         let frame = RasterFrame::new(self.frame, &self.samples);
-        let (rank, buffers) = (rank as u32, &mut self.lens_sums);
-        self.lens_samples
-            .as_ref()
-            .map_or(0, |samples| self.level.run_single(LensHitsJob { frame, samples, rank, region, buffers }))
+        let (ranks, buffers) = (&[rank as u32], &mut self.lens_sums);
+        self.lens_samples.as_ref().map_or(0, |samples| {
+            let [tests, _] = self.level.run_single(LensHitsJob { frame, samples, ranks, region, buffers });
+            tests
+        })
     }
 
     /// Gives those fragments to `sink`.

@@ -82,7 +82,7 @@ impl LensImages {
         let center = [splat.constants.xi, splat.constants.yi];
         let origin = f64::from(center[axis]) - f64::from(corner[axis]);
         let [near, far] = image.defocus;
-        let defocus = 0.5 * (near + far);
+        let defocus = image.defocus();
         let spread = self.lens_radius * 0.5 * (near - far).abs();
         let [middle, half] =
             [0.5 * (image.max[axis] + image.min[axis]) + origin, 0.5 * (image.max[axis] - image.min[axis])];
@@ -100,11 +100,14 @@ impl LensImages {
         self.lens_radius * (image.defocus() - defocus).abs() + rounding
     }
 }
-/// What a pinhole sees of a splat: in pixels relative to its pixel; and 1/focus - 1/w at its nearest and farthest.
+
+/// What a pinhole sees of a splat, and how far its depths are out of focus.
 #[derive(Debug, Clone, Copy)]
 pub struct Image {
+    /// The least and the greatest place, in pixels relative to the splat's.
     pub min: [f64; 2],
     pub max: [f64; 2],
+    /// 1/focus - 1/w at its nearest and farthest.
     pub defocus: [f64; 2],
 }
 
@@ -119,7 +122,9 @@ impl Image {
 /// What is near a splat along an axis: samples from `min` to `max`, plus lens point times `defocus`, in pixels from the tile's
 /// first.
 pub struct Nearness {
+    /// Least.
     pub min: f32,
+    /// Greatest.
     pub max: f32,
     defocus: f32,
 }

@@ -9,10 +9,10 @@
 //! are done, these are [`SurfaceSums`] of the tile's cells.
 
 use crate::evaluate::LaneHits;
-use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
+use crate::lanes::{Eight, Kernel, LANES, Lanes};
 use crate::lens_image::LensImages;
 use crate::places::{Apart, PLACES, TILE, clip, pixel_of};
-use crate::raster::{AHEAD, Evaluation, LaneTable, RasterFrame, TableKernel, with_table};
+use crate::raster::{Evaluation, LaneTable, RasterFrame, TableKernel, with_table};
 use crate::records::cell_of;
 use crate::resolve::interval;
 use crate::surface_sums::SurfaceSums;
@@ -93,7 +93,7 @@ pub struct LensSamples {
     images: LensImages,
     /// Number of samples a pixel.
     count: usize,
-    /// For the same steps of defocus.
+    /// In equal steps of defocus.
     orders: Vec<SortedSamples>,
 }
 
@@ -132,6 +132,20 @@ impl LensSamples {
         &self.orders[(steps as usize).min(last)]
     }
 
+    /// Where in a tile, given by its first pixel, a splat may be hit; `None` if that is not known.
+    #[inline(always)]
+    fn runs(&self, splat: &VisibleSplat, corner: [i32; 2]) -> Option<Runs<'_>> {
+        let image = self.images.image(splat)?;
+        let order = self.order(image.defocus());
+        let drift = self.images.drift(&image, order.defocus) as f32;
+        let [x, y] = [0, 1].map(|axis| self.images.nearness(&image, axis, splat, corner));
+        Some(Runs {
+            order,
+            columns: [order.column(x.min - drift), order.column(x.max + drift)],
+            rows: [order.row(y.min - drift), order.row(y.max + drift)],
+        })
+    }
+
     /// How much less time it takes to sum a splat by lens points than pixel by pixel, by an estimate, in cells tested.
     pub fn gain(&self, splat: &VisibleSplat, region: &PixelRect) -> f64 {
         let Some(image) = self.images.image(splat) else { return 0.0 };
@@ -142,7 +156,7 @@ impl LensSamples {
             let [width, height] = [0, 1].map(|axis| image.max[axis] - image.min[axis] + room);
             share * cells_a_pixel * width * height
         };
-        // Listed samples are evaluated and scattered, those around them only looked at; and each splat has its price.
+        // Hits are evaluated and scattered, samples around them only evaluated; and each splat has its price.
         let by_pixels = 0.8 * area(blur + 2.0 * self.images.filter_radius);
         by_pixels - (3.0 * area(0.0) + 0.4 * area(4.0 * USUAL_DRIFT) + 3.0)
     }
@@ -246,6 +260,13 @@ impl SortedSamples {
     }
 }
 
+/// Samples that a splat may hit: those of some rows and columns (first and last) of the grid.
+struct Runs<'a> {
+    order: &'a SortedSamples,
+    columns: [usize; 2],
+    rows: [usize; 2],
+}
+
 /// What is hit of a splat.
 #[derive(Debug, Default)]
 struct Hits {
@@ -339,13 +360,17 @@ impl TableKernel for LensSumsJob<'_> {
         sums.resize(self.sums.cells() * LANES, SampleSums::EMPTY);
         hits.reserve(self.samples);
         let [mut tests, mut fragments] = [0; 2];
+        let corner = corner_of(&self.region);
+        let runs = |rank: Option<&u32>| {
+            rank.and_then(|&rank| self.samples.runs(&frame.splats[rank as usize], corner))
+        };
+        let mut next = runs(self.ranks.first());
         for (i, &rank) in self.ranks.iter().enumerate() {
-            if let Some(&next) = self.ranks.get(i + AHEAD) {
-                prefetch(&frame.splats[next as usize]);
-                prefetch(&frame.surfaces[next as usize]);
-            }
+            frame.fetch_ahead(self.ranks, i);
+            // A splat ahead: its quotients and roots take long, and nothing waits for them here.
+            let runs = std::mem::replace(&mut next, runs(self.ranks.get(i + 1)));
             if let Some(splat) = LensSplat::<L, T>::new(&frame, rank, &self.region, table) {
-                tests += splat.hit(self.samples, hits);
+                tests += splat.hit(self.samples, runs.as_ref(), hits);
                 fragments += u64::from(splat.sum(hits, sums));
             }
         }
@@ -354,15 +379,16 @@ impl TableKernel for LensSumsJob<'_> {
     }
 }
 
-/// Finds the fragments of a splat in a region, of which [`LensSums::found`] tells. Gives the number of samples tested.
+/// Makes the fragments of some splats in a region and forgets them, all but those of the last, of which [`LensSums::found`]
+/// tells. Gives the number of samples tested and that of fragments.
 #[derive(Debug)]
 pub struct LensHitsJob<'a> {
     /// As [`LensSumsJob::frame`].
     pub frame: RasterFrame<'a>,
     /// As [`LensSumsJob::samples`].
     pub samples: &'a LensSamples,
-    /// The rank of the splat.
-    pub rank: u32,
+    /// As [`LensSumsJob::ranks`].
+    pub ranks: &'a [u32],
     /// As [`LensSumsJob::region`].
     pub region: PixelRect,
     /// Where the fragments go.
@@ -370,34 +396,32 @@ pub struct LensHitsJob<'a> {
 }
 
 impl Kernel for LensHitsJob<'_> {
-    type Output = u64;
+    type Output = [u64; 2];
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> u64 {
+    fn run<L: Lanes>(self) -> [u64; 2] {
         with_table::<L, _>(self.frame.rasterizer.table(), self)
     }
 }
 
 impl TableKernel for LensHitsJob<'_> {
-    type Output = u64;
+    type Output = [u64; 2];
 
     #[inline(always)]
-    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> u64 {
+    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> [u64; 2] {
         let hits = &mut self.buffers.hits;
         hits.reserve(self.samples);
-        hits.count = 0;
-        let Some(splat) = LensSplat::<L, T>::new(&self.frame, self.rank, &self.region, table) else {
-            return 0;
-        };
-        let tests = splat.hit(self.samples, hits);
-        let (depth, _) = hits.depth.as_chunks_mut();
-        let (r2, _) = hits.r2.as_chunks_mut();
-        let mut misses = L::splat(0.0);
-        for (depth, r2) in depth.iter().zip(r2).take(hits.count.div_ceil(LANES)) {
-            let (_, weight) = splat.splat.weighed(L::load(depth), L::load(r2), &mut misses);
-            weight.store_cell::<0>(r2);
+        let [mut tests, mut fragments] = [0; 2];
+        for (i, &rank) in self.ranks.iter().enumerate() {
+            self.frame.fetch_ahead(self.ranks, i);
+            hits.count = 0;
+            if let Some(splat) = LensSplat::<L, T>::new(&self.frame, rank, &self.region, table) {
+                let runs = self.samples.runs(splat.splat.splat, splat.corner);
+                tests += splat.hit(self.samples, runs.as_ref(), hits);
+                fragments += u64::from(splat.weigh(hits));
+            }
         }
-        tests
+        [tests, fragments]
     }
 }
 
@@ -411,6 +435,12 @@ impl LensSums {
             ([number / LANES, number % LANES], depth, weight)
         })
     }
+}
+
+/// The first pixel of the tile of a region.
+#[inline(always)]
+fn corner_of(region: &PixelRect) -> [i32; 2] {
+    [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)]
 }
 
 /// A splat over the samples of a tile.
@@ -432,7 +462,7 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
         if splat.culls && splat.splat.back && !splat.splat.flips {
             return None;
         }
-        let corner = [region.x0 & !(TILE - 1), region.y0 & !(TILE - 1)];
+        let corner = corner_of(region);
         Some(Self {
             apart: Apart::new(splat.splat, corner),
             splat,
@@ -442,14 +472,14 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
         })
     }
 
-    /// Finds what is hit. Returns the number of samples tested.
+    /// Finds what is hit, of these runs, if they are known. Returns the number of samples tested.
     #[inline(always)]
-    fn hit(&self, samples: &LensSamples, hits: &mut Hits) -> u64 {
+    fn hit(&self, samples: &LensSamples, runs: Option<&Runs<'_>>, hits: &mut Hits) -> u64 {
         hits.count = 0;
         let cells = if self.splat.splat.plain {
-            self.hit_samples::<true>(samples, hits)
+            self.hit_runs::<true>(samples, runs, hits)
         } else {
-            self.hit_samples::<false>(samples, hits)
+            self.hit_runs::<false>(samples, runs, hits)
         };
         hits.end();
         (cells * LANES) as u64
@@ -457,20 +487,20 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
 
     /// [`Self::hit`], given whether the splat is plain. Returns the number of cells tested.
     #[inline(always)]
-    fn hit_samples<const PLAIN: bool>(&self, samples: &LensSamples, hits: &mut Hits) -> usize {
-        let images = &samples.images;
-        let Some(image) = images.image(self.splat.splat) else {
+    fn hit_runs<const PLAIN: bool>(
+        &self,
+        samples: &LensSamples,
+        runs: Option<&Runs<'_>>,
+        hits: &mut Hits,
+    ) -> usize {
+        let Some(Runs { order, columns, rows: [first, last] }) = runs else {
             let all = &samples.orders[0].cells;
             self.hit_cells::<PLAIN>(all, hits);
             return all.len();
         };
-        let order = samples.order(image.defocus());
-        let drift = images.drift(&image, order.defocus) as f32;
-        let [x, y] = [0, 1].map(|axis| images.nearness(&image, axis, self.splat.splat, self.corner));
-        let columns = [order.column(x.min - drift), order.column(x.max + drift)];
         let mut tested = 0;
-        for row in order.row(y.min - drift)..order.row(y.max + drift) + 1 {
-            let run = order.run(row, columns);
+        for row in *first..last + 1 {
+            let run = order.run(row, *columns);
             tested += run.len();
             self.hit_cells::<PLAIN>(run, hits);
         }
@@ -507,6 +537,20 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
         hits
     }
 
+    /// Turns the squares of hits into weights. Returns the number of fragments.
+    #[inline(always)]
+    fn weigh(&self, hits: &mut Hits) -> u32 {
+        let eights = hits.count.div_ceil(LANES);
+        let mut misses = L::splat(0.0);
+        let (depth, _) = hits.depth.as_chunks();
+        let (r2, _) = hits.r2.as_chunks_mut();
+        for (depth, r2) in depth.iter().zip(r2).take(eights) {
+            let (_, weight) = self.splat.weighed(L::load(depth), L::load(r2), &mut misses);
+            weight.store_cell::<0>(r2);
+        }
+        count_hits(eights, misses)
+    }
+
     /// Adds hits to the sums of their samples. Returns the number of fragments.
     ///
     /// In two loops, so that neither waits for what the other has just written.
@@ -537,8 +581,14 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
             *last_near = if near > *last_near { near } else { *last_near };
             *first_far = if far < *first_far { far } else { *first_far };
         }
-        let mut counts = [0.0; LANES];
-        misses.store_cell::<0>(&mut counts);
-        (eights * LANES) as u32 - counts.iter().sum::<f32>() as u32
+        count_hits(eights, misses)
     }
+}
+
+/// The number of hits in some eights, given the misses in each lane.
+#[inline(always)]
+fn count_hits<L: Lanes>(eights: usize, misses: L) -> u32 {
+    let mut counts = [0.0; LANES];
+    misses.store_cell::<0>(&mut counts);
+    (eights * LANES) as u32 - counts.iter().sum::<f32>() as u32
 }

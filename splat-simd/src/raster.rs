@@ -15,7 +15,7 @@ use splat_core::render::Frame;
 use splat_core::setup::VisibleSplat;
 
 /// How many splats ahead of the one at work the next ones are fetched.
-pub const AHEAD: usize = 6;
+const AHEAD: usize = 6;
 
 /// What is the same for all regions of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +41,15 @@ impl<'a> RasterFrame<'a> {
             splats: &frame.set_up.splats,
             surfaces: &frame.set_up.surfaces,
             filter_radius: frame.view.filter_radius as f32,
+        }
+    }
+
+    /// Asks for a splat that comes soon after number `i` of a list.
+    #[inline(always)]
+    pub fn fetch_ahead(&self, ranks: &[u32], i: usize) {
+        if let Some(&next) = ranks.get(i + AHEAD) {
+            prefetch(&self.splats[next as usize]);
+            prefetch(&self.surfaces[next as usize]);
         }
     }
 }
@@ -129,10 +138,7 @@ impl RasterJob<'_> {
         let Self { frame, ranks, region, records, places, distorted, mut target } = self;
         let mut tests = 0;
         for (i, &rank) in ranks.iter().enumerate() {
-            if let Some(&next) = ranks.get(i + AHEAD) {
-                prefetch(&frame.splats[next as usize]);
-                prefetch(&frame.surfaces[next as usize]);
-            }
+            frame.fetch_ahead(ranks, i);
             let splat = &frame.splats[rank as usize];
             places.fill::<L>(splat, &region, frame.filter_radius);
             if let Target::Layered(sums) = &target {
@@ -191,10 +197,7 @@ impl TableKernel for LatticeJob<'_> {
         let partial = region.area() < PLACES;
         let mut tests = 0;
         for (i, &rank) in ranks.iter().enumerate() {
-            if let Some(&next) = ranks.get(i + AHEAD) {
-                prefetch(&frame.splats[next as usize]);
-                prefetch(&frame.surfaces[next as usize]);
-            }
+            frame.fetch_ahead(ranks, i);
             let splat = &frame.splats[rank as usize];
             lattice.list::<L>(splat, corner, cells);
             let surface = &frame.surfaces[rank as usize];
@@ -390,7 +393,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Not at once where the hits are found: this way neither loop is so long that the processor sees only one cell of it
     /// at a time.
     #[inline(always)]
-    pub fn weigh(&self, records: &mut [Record]) -> u32 {
+    fn weigh(&self, records: &mut [Record]) -> u32 {
         let count = records.len();
         let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks_mut::<2>();

@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellList, Lattice};
 use crate::lens_image::LensImages;
-use crate::lens_sums::{LensSamples, LensSums, LensSumsJob};
+use crate::lens_sums::{LensHitsJob, LensSamples, LensSums, LensSumsJob};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
@@ -28,7 +28,7 @@ use std::time::Instant;
 const SET_UP_CHUNK: usize = 4096;
 
 /// The same for its second step.
-const SET_UP_PART: usize = 1024;
+const SET_UP_PART: usize = 256;
 
 /// Tasks of that step whose results are joined at once.
 const SET_UP_PARTS: usize = 16;
@@ -391,12 +391,20 @@ impl<'a> Picture<'a> {
     /// Makes the fragments of a tile and forgets them.
     fn count(&self, worker: &mut Worker, region: &PixelRect, ranks: &[u32]) -> Statistics {
         let start = Instant::now();
-        worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), usize::MAX);
-        worker.records.forget();
-        worker.distorted.fill(&self.frame.rasterizer, region, self.level);
-        let lattice = self.lattice_for(region, ranks);
-        let tests = self.rasterize(worker, region, ranks, lattice);
-        let fragments = worker.records.fragments;
+        let [tests, fragments] = match self.lens_samples_for(region, ranks) {
+            Some(samples) => {
+                let (frame, region, buffers) = (self.raster_frame(), *region, &mut worker.lens_sums);
+                self.level.run_single(LensHitsJob { frame, samples, ranks, region, buffers })
+            }
+            None => {
+                worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), usize::MAX);
+                worker.records.forget();
+                worker.distorted.fill(&self.frame.rasterizer, region, self.level);
+                let lattice = if self.can_sum { None } else { self.lattice_for(region, ranks) };
+                let tests = self.rasterize(worker, region, ranks, lattice);
+                [tests, worker.records.fragments]
+            }
+        };
         Statistics { tests, fragments, raster: start.elapsed(), ..Statistics::default() }
     }
 

@@ -179,12 +179,14 @@ impl View {
 
     /// The pixels of the window of which a sample may fall into a box (in pixels). Pixel i's samples lie within the
     /// filter's radius of i + 1/2.
+    #[inline(always)]
     pub(super) fn pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let Some(map) = &self.distortion else { return self.film_pixels_that_reach(screen) };
         map.film_box(screen).map_or(NO_PIXELS, |film| self.film_pixels_that_reach(&film))
     }
 
     /// The same for a box of the film.
+    #[inline(always)]
     fn film_pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let room = self.filter_radius + BOX_PADDING;
         // Integers saturate, and the window is far smaller than their range.
