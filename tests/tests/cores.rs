@@ -600,6 +600,16 @@ fn weights_on_the_very_thresholds_agree() {
 }
 
 /// Small splats far out of focus, for which the fast core takes another way than for others.
+/// Whether the fast core tests fewer samples than it would pixel by pixel.
+fn goes_by_lens_points(cloud: &Cloud, camera: &Camera, options: &RenderOptions) -> bool {
+    let level = Level::Portable;
+    let by_pixels = splat_simd::fragments(cloud, camera, options, level, Method::Pixels, &mut |_, _, _| {});
+    let options = RenderOptions { tile_memory: 64 << 20, ..options.clone() };
+    let mut renderer = Renderer::new(1, level).unwrap();
+    let rendered = renderer.render(cloud, camera, &options, &mut |_| {}).unwrap();
+    rendered.statistics.tests < by_pixels.unwrap()
+}
+
 #[test]
 fn large_circles_of_confusion_agree() {
     let counts = RefCell::new([0; 2]);
@@ -615,14 +625,7 @@ fn large_circles_of_confusion_agree() {
         let camera = with_lens(pinhole(72, 52, 150.0), Lens { radius, focus, blades });
         check_fragments(&cloud, &camera, &options, &[]);
         check_pictures(&cloud, &camera, &options, &[2], &[memory]);
-        let level = Level::Portable;
-        let by_pixels =
-            splat_simd::fragments(&cloud, &camera, &options, level, Method::Pixels, &mut |_, _, _| {})
-                .unwrap();
-        let options = RenderOptions { tile_memory: 64 << 20, ..options };
-        let mut renderer = Renderer::new(1, level).unwrap();
-        let tests = renderer.render(&cloud, &camera, &options, &mut |_| {}).unwrap().statistics.tests;
-        counts.borrow_mut()[usize::from(tests < by_pixels)] += 1;
+        counts.borrow_mut()[usize::from(goes_by_lens_points(&cloud, &camera, &options))] += 1;
     });
     let [one_way, another] = counts.into_inner();
     assert!(another > 8, "{another} of {} were drawn by lens points", one_way + another);
@@ -647,14 +650,7 @@ fn blurred_surfaces_agree() {
         let thickness = if seed % 5 == 0 { 1e200 } else { options.thickness };
         let options = RenderOptions { resolve, aovs, thickness, cull: true, ..options };
         check_pictures(&cloud, &camera, &options, &[1 + seed as usize % 3], &[memory, memory]);
-        let level = Level::Portable;
-        let by_pixels =
-            splat_simd::fragments(&cloud, &camera, &options, level, Method::Pixels, &mut |_, _, _| {})
-                .unwrap();
-        let options = RenderOptions { tile_memory: 64 << 20, ..options };
-        let mut renderer = Renderer::new(1, level).unwrap();
-        let tests = renderer.render(&cloud, &camera, &options, &mut |_| {}).unwrap().statistics.tests;
-        counts.borrow_mut()[usize::from(tests < by_pixels)] += 1;
+        counts.borrow_mut()[usize::from(goes_by_lens_points(&cloud, &camera, &options))] += 1;
     });
     let [one_way, another] = counts.into_inner();
     assert!(another > 8, "{another} of {} were drawn sample by sample", one_way + another);
