@@ -56,6 +56,9 @@ const SPLATS_ASKED: usize = 32;
 /// twice.
 const MOST_LAYERED: f32 = 0.25;
 
+/// The same out of focus, where to rasterise a pixel again takes far longer than by lens points.
+const MOST_LAYERED_BLURRED: f32 = 1.0 / 32.0;
+
 /// The number of groups of samples up to which the sums of a tile stay in the second cache.
 const MOST_SUMMED: usize = 8;
 
@@ -481,18 +484,17 @@ impl<'a> Picture<'a> {
             return quarters(region)
                 .try_for_each(|quarter| self.region(worker, &quarter, ranks, pixels, film, statistics));
         }
-        let summed = self.can_sum && worker.layered_share < MOST_LAYERED;
+        let sums = self.sum_surfaces(worker, region, ranks, limit);
+        let summed = sums.is_some();
         // Sums are of cells of pixels.
         let lattice = if summed { None } else { self.lattice_for(region, ranks) };
-        let (tests, fragments) = if summed {
-            self.sum_surfaces(worker, region, ranks, limit)
-        } else {
+        let (tests, fragments) = sums.unwrap_or_else(|| {
             // So that sums are tried again in a while.
             worker.layered_share *= 0.9;
             worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), limit);
             let tests = self.rasterize(worker, region, ranks, lattice);
             (tests, worker.records.fragments)
-        };
+        });
         if !worker.records.is_complete() {
             if summed {
                 worker.sums.clear();
@@ -549,20 +551,25 @@ impl<'a> Picture<'a> {
         Ok(())
     }
 
-    /// Makes the fragments of a region: sums where a cell holds one layer, and records for the others. Returns the
-    /// number of samples tested and that of fragments.
+    /// Makes the fragments of a region: sums where a cell holds one layer, and records for the others. Returns the number of
+    /// samples tested and that of fragments; `None` if there can be no sums, or they are not worth their while.
     fn sum_surfaces(
         &self,
         worker: &mut Worker,
         region: &PixelRect,
         ranks: &[u32],
         limit: usize,
-    ) -> (u64, u64) {
+    ) -> Option<(u64, u64)> {
+        let lens_samples = self.lens_samples_for(region, ranks);
+        let most = if lens_samples.is_some() { MOST_LAYERED_BLURRED } else { MOST_LAYERED };
+        if !self.can_sum || worker.layered_share > most {
+            return None;
+        }
         let groups = self.samples.groups();
         worker.sums.prepare(groups);
         worker.records.clear(groups, false, usize::MAX);
         worker.records.forget();
-        let [tests, fragments] = match self.lens_samples_for(region, ranks) {
+        let [tests, fragments] = match lens_samples {
             Some(samples) => self.sum_samples(worker, region, ranks, samples),
             None => {
                 let tests = self.rasterize_pixels(worker, region, ranks, Keep::Sums);
@@ -571,11 +578,15 @@ impl<'a> Picture<'a> {
         };
         let [layered, hit] = self.level.run_single(FindLayered { sums: &mut worker.sums });
         worker.layered_share = layered as f32 / hit.max(1) as f32;
+        if lens_samples.is_some() && worker.layered_share > most {
+            worker.sums.clear();
+            return None;
+        }
         worker.records.clear(groups, false, limit);
         if layered > 0 {
             self.rasterize_pixels(worker, region, ranks, Keep::Layered);
         }
-        (tests, fragments)
+        Some((tests, fragments))
     }
 
     /// Sums the surfaces of a region by lens points. Returns the number of samples tested and that of fragments.
