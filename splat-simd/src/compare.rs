@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellList, Lattice};
 use crate::lens_image::LensImages;
-use crate::lens_sums::{LensHitsJob, LensSamples, LensSums};
+use crate::lens_sums::{LensSamples, LensSums, LensSumsJob};
 use crate::places::{PLACES, PlaceList, TILE, pixel_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
 use crate::records::{RecordBuffer, cell_of};
@@ -89,7 +89,8 @@ impl<'a> SplatBySplat<'a> {
         let frame = RasterFrame::new(self.frame, &self.samples);
         let (ranks, buffers) = (&[rank as u32], &mut self.lens_sums);
         self.lens_samples.as_ref().map_or(0, |samples| {
-            let [tests, _] = self.level.run_single(LensHitsJob { frame, samples, ranks, region, buffers });
+            let [tests, _] =
+                self.level.run_single(LensSumsJob { frame, samples, ranks, region, buffers, sums: None });
             tests
         })
     }

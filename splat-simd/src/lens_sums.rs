@@ -337,8 +337,8 @@ pub struct LensSumsJob<'a> {
     pub region: PixelRect,
     /// Scratch.
     pub buffers: &'a mut LensSums,
-    /// Where the sums go.
-    pub sums: &'a mut SurfaceSums,
+    /// Where the sums go; without, fragments are made and forgotten, all but those of the last splat ([`LensSums::found`]).
+    pub sums: Option<&'a mut SurfaceSums>,
 }
 
 impl Kernel for LensSumsJob<'_> {
@@ -357,7 +357,9 @@ impl TableKernel for LensSumsJob<'_> {
     fn run<L: Lanes, T: LaneTable>(self, table: &T) -> [u64; 2] {
         let frame = self.frame;
         let LensSums { sums, hits } = self.buffers;
-        sums.resize(self.sums.cells() * LANES, SampleSums::EMPTY);
+        if let Some(to) = &self.sums {
+            sums.resize(to.cells() * LANES, SampleSums::EMPTY);
+        }
         hits.reserve(self.samples);
         let [mut tests, mut fragments] = [0; 2];
         let corner = corner_of(&self.region);
@@ -369,64 +371,23 @@ impl TableKernel for LensSumsJob<'_> {
             frame.fetch_ahead(self.ranks, i);
             // A splat ahead: its quotients and roots take long, and nothing waits for them here.
             let runs = std::mem::replace(&mut next, runs(self.ranks.get(i + 1)));
+            hits.count = 0;
             if let Some(splat) = LensSplat::<L, T>::new(&frame, rank, &self.region, table) {
                 tests += splat.hit(self.samples, runs.as_ref(), hits);
-                fragments += u64::from(splat.sum(hits, sums));
+                fragments +=
+                    u64::from(if self.sums.is_some() { splat.sum(hits, sums) } else { splat.weigh(hits) });
             }
         }
-        self.sums.take_samples(sums);
-        [tests, fragments]
-    }
-}
-
-/// Makes the fragments of some splats in a region and forgets them, all but those of the last, of which [`LensSums::found`]
-/// tells. Gives the number of samples tested and that of fragments.
-#[derive(Debug)]
-pub struct LensHitsJob<'a> {
-    /// As [`LensSumsJob::frame`].
-    pub frame: RasterFrame<'a>,
-    /// As [`LensSumsJob::samples`].
-    pub samples: &'a LensSamples,
-    /// As [`LensSumsJob::ranks`].
-    pub ranks: &'a [u32],
-    /// As [`LensSumsJob::region`].
-    pub region: PixelRect,
-    /// Where the fragments go.
-    pub buffers: &'a mut LensSums,
-}
-
-impl Kernel for LensHitsJob<'_> {
-    type Output = [u64; 2];
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> [u64; 2] {
-        with_table::<L, _>(self.frame.rasterizer.table(), self)
-    }
-}
-
-impl TableKernel for LensHitsJob<'_> {
-    type Output = [u64; 2];
-
-    #[inline(always)]
-    fn run<L: Lanes, T: LaneTable>(self, table: &T) -> [u64; 2] {
-        let hits = &mut self.buffers.hits;
-        hits.reserve(self.samples);
-        let [mut tests, mut fragments] = [0; 2];
-        for (i, &rank) in self.ranks.iter().enumerate() {
-            self.frame.fetch_ahead(self.ranks, i);
-            hits.count = 0;
-            if let Some(splat) = LensSplat::<L, T>::new(&self.frame, rank, &self.region, table) {
-                let runs = self.samples.runs(splat.splat.splat, splat.corner);
-                tests += splat.hit(self.samples, runs.as_ref(), hits);
-                fragments += u64::from(splat.weigh(hits));
-            }
+        if let Some(to) = self.sums {
+            to.take_samples(sums);
         }
         [tests, fragments]
     }
 }
 
 impl LensSums {
-    /// The cell and the lane of the sample of each fragment of the last [`LensHitsJob`], its depth and its weight.
+    /// The cell and the lane of the sample of each fragment of the last splat of a [`LensSumsJob`] without sums, its depth and its
+    /// weight.
     pub fn found(&self) -> impl Iterator<Item = ([usize; 2], f32, f32)> {
         let Hits { depth, r2: weight, numbers, count, .. } = &self.hits;
         let all = depth.iter().zip(weight).zip(numbers).take(*count);
@@ -472,10 +433,9 @@ impl<'a, L: Lanes, T: LaneTable> LensSplat<'a, L, T> {
         })
     }
 
-    /// Finds what is hit, of these runs, if they are known. Returns the number of samples tested.
+    /// Appends what is hit, of these runs, if they are known. Returns the number of samples tested.
     #[inline(always)]
     fn hit(&self, samples: &LensSamples, runs: Option<&Runs<'_>>, hits: &mut Hits) -> u64 {
-        hits.count = 0;
         let cells = if self.splat.splat.plain {
             self.hit_runs::<true>(samples, runs, hits)
         } else {

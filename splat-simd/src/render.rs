@@ -3,7 +3,7 @@
 use crate::lanes::{LANES, Level};
 use crate::lattice::{CellList, Lattice};
 use crate::lens_image::LensImages;
-use crate::lens_sums::{LensHitsJob, LensSamples, LensSums, LensSumsJob};
+use crate::lens_sums::{LensSamples, LensSums, LensSumsJob};
 use crate::over::Over;
 use crate::places::{PLACES, PlaceList, place_of};
 use crate::raster::{LatticeJob, RasterFrame, RasterJob, Target};
@@ -397,7 +397,7 @@ impl<'a> Picture<'a> {
         let [tests, fragments] = match self.lens_samples_for(region, ranks) {
             Some(samples) => {
                 let (frame, region, buffers) = (self.raster_frame(), *region, &mut worker.lens_sums);
-                self.level.run_single(LensHitsJob { frame, samples, ranks, region, buffers })
+                self.level.run_single(LensSumsJob { frame, samples, ranks, region, buffers, sums: None })
             }
             None => {
                 worker.records.clear(self.samples.groups(), two_sided(self.cloud, self.options), usize::MAX);
@@ -598,7 +598,7 @@ impl<'a> Picture<'a> {
         samples: &LensSamples,
     ) -> [u64; 2] {
         let Worker { sums, lens_sums: buffers, .. } = worker;
-        let (frame, region) = (self.raster_frame(), *region);
+        let (frame, region, sums) = (self.raster_frame(), *region, Some(sums));
         self.level.run_single(LensSumsJob { frame, samples, ranks, region, buffers, sums })
     }
 
