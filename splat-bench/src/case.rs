@@ -23,6 +23,8 @@ pub enum Subject {
     /// The same at a quarter of its width and height, of a sixteenth as many discs: each is as large in pixels as in the
     /// whole one. For tools that are slow.
     Quarter(usize),
+    /// The sphere, each disc in a colour of its own.
+    Colored(usize),
     /// `surfels/dragon_res3_surfels.ply` of the real files.
     Dragon,
     /// `surfels/pond_pmvs.ply` of the real files.
@@ -69,7 +71,7 @@ impl Subject {
         let case = |samples, blur| Case { subject: self, samples, blur };
         match self {
             Self::Dragon | Self::Pond => vec![case(16, Blur::Pinhole)],
-            Self::Sphere(_) | Self::Quarter(_) => {
+            Self::Sphere(_) | Self::Quarter(_) | Self::Colored(_) => {
                 [8, 16].into_iter().flat_map(|samples| Blur::ALL.map(|blur| case(samples, blur))).collect()
             }
         }
@@ -83,6 +85,7 @@ impl Subject {
         let file = match self {
             Self::Sphere(thousands) => return Ok(Some(sphere(thousands * 1000))),
             Self::Quarter(thousands) => return Ok(Some(sphere(thousands * 1000 / 16))),
+            Self::Colored(thousands) => return Ok(Some(colored(sphere(thousands * 1000)))),
             Self::Dragon => "surfels/dragon_res3_surfels.ply",
             Self::Pond => "surfels/pond_pmvs.ply",
         };
@@ -99,11 +102,18 @@ impl Subject {
     }
 }
 
+/// A cloud coloured by where its splats stand.
+fn colored(mut cloud: Cloud) -> Cloud {
+    cloud.colors = Some(cloud.positions.iter().map(|position| 0.5 + 0.5 * *position).collect());
+    cloud
+}
+
 impl fmt::Display for Subject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Sphere(thousands) => write!(f, "sphere-{thousands}k"),
             Self::Quarter(thousands) => write!(f, "quarter-{thousands}k"),
+            Self::Colored(thousands) => write!(f, "colored-{thousands}k"),
             Self::Dragon => write!(f, "dragon"),
             Self::Pond => write!(f, "pond"),
         }
@@ -147,9 +157,9 @@ impl Case {
     /// # Errors
     /// If there is none; the message lists them all.
     pub fn named(name: &str) -> anyhow::Result<Self> {
-        let quarters = [Subject::Quarter(100), Subject::Quarter(1000)];
+        let others = [100, 1000].into_iter().flat_map(|n| [Subject::Quarter(n), Subject::Colored(n)]);
         let cases: Vec<Self> =
-            Subject::ALL.into_iter().chain(quarters).flat_map(|subject| subject.cases()).collect();
+            Subject::ALL.into_iter().chain(others).flat_map(|subject| subject.cases()).collect();
         let found = cases.iter().find(|case| case.to_string() == name).copied();
         let names: Vec<String> = cases.iter().map(Self::to_string).collect();
         found.with_context(|| format!("found case {name:?}, expected one of {}", names.join(" ")))
@@ -166,7 +176,7 @@ impl Case {
     /// If the cloud has nothing to be seen.
     pub fn scene(self, cloud: &Cloud) -> anyhow::Result<Scene> {
         match self.subject {
-            Subject::Sphere(_) => Ok(self.sphere_scene(1)),
+            Subject::Sphere(_) | Subject::Colored(_) => Ok(self.sphere_scene(1)),
             Subject::Quarter(_) => Ok(self.sphere_scene(4)),
             Subject::Dragon | Subject::Pond => self.fitted_scene(cloud),
         }

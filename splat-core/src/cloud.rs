@@ -243,7 +243,7 @@ impl Cloud {
     /// Why the splat must not be rendered, or `None` if it is fit. SPEC section 2.
     ///
     /// Expects a cloud whose arrays belong together and whose normals are known.
-    #[inline]
+    #[inline(always)]
     pub fn defect(&self, index: usize) -> Option<Defect> {
         if self.is_outlier(index) {
             return Some(Defect::Outlier);

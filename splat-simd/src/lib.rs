@@ -6,6 +6,7 @@
 
 mod compare;
 mod evaluate;
+mod interval_bounds;
 mod lanes;
 mod lattice;
 mod lens_image;

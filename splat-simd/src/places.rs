@@ -33,13 +33,22 @@ pub struct PlaceList {
     /// Room for a row more: rows are written whole, and only counted as far as they go.
     places: [u16; PLACES + TILE as usize],
     count: usize,
+    /// The rows that were listed, of which `row_count` are in use: the first place of each, and the number of its places.
+    rows: [(u16, u16); TILE as usize + 1],
+    row_count: usize,
     /// x - xi of each column of the tile, and y - yi of each row.
     offsets: [[f32; TILE as usize]; 2],
 }
 
 impl Default for PlaceList {
     fn default() -> Self {
-        Self { places: [0; PLACES + TILE as usize], count: 0, offsets: [[0.0; TILE as usize]; 2] }
+        Self {
+            places: [0; PLACES + TILE as usize],
+            count: 0,
+            rows: [(0, 0); TILE as usize + 1],
+            row_count: 0,
+            offsets: [[0.0; TILE as usize]; 2],
+        }
     }
 }
 
@@ -48,6 +57,12 @@ impl PlaceList {
     #[inline(always)]
     pub fn places(&self) -> &[u16] {
         &self.places[..self.count]
+    }
+
+    /// The first place of each row, and the number of its places: as they were listed, whichever were kept.
+    #[inline(always)]
+    pub fn rows(&self) -> &[(u16, u16)] {
+        &self.rows[..self.row_count]
     }
 
     /// Keeps some of the places, in their order.
@@ -73,7 +88,7 @@ impl PlaceList {
     /// the pixel filter.
     #[inline(always)]
     pub fn fill<L: Lanes>(&mut self, splat: &VisibleSplat, region: &PixelRect, reach: f32) {
-        self.count = 0;
+        (self.count, self.row_count) = (0, 0);
         let candidates = splat.bounds.intersect(region);
         if candidates.is_empty() {
             return;
@@ -100,9 +115,8 @@ impl PlaceList {
                 if y >= candidates.y1 {
                     return;
                 }
-                // Truncation is exact: these are integers of a few thousand at most.
-                let start = (start as i32 + center[0]).max(candidates.x0);
-                let end = (end as i32 + center[0]).min(candidates.x1);
+                let start = (start + center[0]).max(candidates.x0);
+                let end = (end + center[0]).min(candidates.x1);
                 self.push_row(start, end, y);
             }
             y += LANES as i32;
@@ -119,7 +133,10 @@ impl PlaceList {
                 *place = first + i as u16;
             }
         }
-        self.count += (end - start).max(0) as usize;
+        let count = (end - start).max(0);
+        self.count += count as usize;
+        self.rows[self.row_count] = (first, count as u16);
+        self.row_count += usize::from(count > 0);
     }
 }
 
@@ -152,7 +169,7 @@ impl<L: Lanes> RowSpans<L> {
     /// The samples of a row of pixels lie in a band of `reach` about its middle. The outline's edge x(t) = t r +- n sqrt(1 -
     /// t^2) (half widths, t in half heights) turns at t = +-r, so its extreme in the band is where t comes nearest to that.
     #[inline(always)]
-    fn eight_rows(&self, row: i32) -> [Eight; 2] {
+    fn eight_rows(&self, row: i32) -> [[i32; LANES]; 2] {
         let (zero, half, one) = (L::splat(0.0), L::splat(0.5), L::splat(1.0));
         let iota = L::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let middle = (L::splat(row as f32) + iota) + half - self.center[1];
@@ -165,11 +182,10 @@ impl<L: Lanes> RowSpans<L> {
         let end = (self.center[0] + right + self.reach - half).round_down() + one;
         // No pixel where the band passes by the outline.
         let end = low.less_or_equal(high).select(end, start);
-        let mut spans = [[0.0; LANES]; 2];
-        start.store_cell::<0>(&mut spans[0]);
-        end.store_cell::<0>(&mut spans[1]);
-        spans
+        // They are a few thousand at most.
+        [start.whole(), end.whole()]
     }
+
     /// The edge's extreme in a band of heights, given where it turns.
     #[inline(always)]
     fn edge(&self, [low, high]: [L; 2], turn: L, narrowing: L) -> L {
@@ -234,7 +250,7 @@ pub fn clip<L: Lanes>([x, y]: [L; 2], corner: [i32; 2], region: &PixelRect, hits
 
 #[cfg(test)]
 #[expect(clippy::disallowed_methods, reason = "no bits of a picture come from here")]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::lanes::{Kernel, Level};
     use proptest::prelude::*;
@@ -250,17 +266,17 @@ mod tests {
     }
 
     impl Kernel for Rows {
-        type Output = [Eight; 2];
+        type Output = [[i32; LANES]; 2];
 
         #[inline(always)]
-        fn run<L: Lanes>(self) -> [Eight; 2] {
+        fn run<L: Lanes>(self) -> [[i32; LANES]; 2] {
             RowSpans::<L>::new(&splat(self.outline, PixelRect::new(0, 0, 1, 1)), self.reach)
                 .eight_rows(self.row)
         }
     }
 
     /// A splat of which nothing but the outline and the bounds matters.
-    fn splat(outline: Outline, bounds: PixelRect) -> VisibleSplat {
+    pub(crate) fn splat(outline: Outline, bounds: PixelRect) -> VisibleSplat {
         let constants = SplatConstants {
             xi: 0,
             yi: 0,
@@ -347,7 +363,7 @@ mod tests {
             for level in Level::available() {
                 let [starts, ends] = level.run(Rows { outline, reach, row });
                 for i in 0..LANES {
-                    let [start, end] = [starts[i] as i32, ends[i] as i32];
+                    let [start, end] = [starts[i], ends[i]];
                     let span = |padding: f64| exact_span(&outline, f64::from(reach) + padding * BOX_PADDING, row + i as i32);
                     // Padded by half as much it lies within, padded by twice as much without.
                     if let Some([first, last]) = span(0.5) {
@@ -387,7 +403,7 @@ mod tests {
                 let mut expected = Vec::new();
                 for y in candidates.y0..candidates.y1.max(candidates.y0) {
                     let [starts, ends] = level.run(Rows { outline, reach: 1.5, row: y });
-                    let [start, end] = if outline.is_known() { [starts[0] as i32, ends[0] as i32] } else { [-99, 99] };
+                    let [start, end] = if outline.is_known() { [starts[0], ends[0]] } else { [-99, 99] };
                     expected.extend((start.max(candidates.x0)..end.min(candidates.x1)).map(|x| [x, y]));
                 }
                 let mut list = PlaceList::default();

@@ -1,12 +1,13 @@
 //! From splats to fragments: the eight samples of a cell against one splat at a time.
 
 use crate::evaluate::{LaneHits, LaneLimits, LaneSplat};
+use crate::interval_bounds::IntervalBounds;
 use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
 use crate::lattice::{CellList, Lattice};
 use crate::places::{Apart, PLACES, PlaceList, TILE, clip as clip_hits};
 use crate::records::{Key, Page, Record, RecordBuffer, cell_of};
 use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
-use crate::surface_sums::SurfaceSums;
+use crate::surface_sums::{self, COLOR, GREY, Line, SurfaceSums};
 use splat_abuffer::SplatSurface;
 use splat_core::PixelRect;
 use splat_core::kernel::{KernelTable, Polynomials};
@@ -142,10 +143,21 @@ impl RasterJob<'_> {
             let splat = &frame.splats[rank as usize];
             places.fill::<L>(splat, &region, frame.filter_radius);
             if let Target::Layered(sums) = &target {
-                places.retain(|place| sums.is_layered(cell_of(place, 0)));
+                places.retain(|place| sums.is_layered(place.into()));
+            }
+            let surface = &frame.surfaces[rank as usize];
+            if FORM == PINHOLE
+                && splat.plain
+                && let Target::Sums(sums) = &mut target
+                && IntervalBounds::suit(splat, surface, frame.filter_radius)
+            {
+                tests += (places.places().len() * frame.samples.samples()) as u64;
+                sums.bounds.add::<L::Single>(splat, surface, places, frame.filter_radius);
+                let splat = Evaluation::<L, T>::new(&frame, splat, table);
+                records.fragments += u64::from(splat.sum_plain(places, surface, sums));
+                continue;
             }
             let cells = places.places().len() * frame.samples.groups();
-            let surface = &frame.surfaces[rank as usize];
             let Some(mut page) = records.begin(rank, surface, cells) else { break };
             tests += (places.places().len() * frame.samples.samples()) as u64;
             let splat = Evaluation::<L, T>::new(&frame, splat, table);
@@ -326,6 +338,89 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         }
     }
 
+    /// Adds the hits in a list of pixels to the sums of their cells: for a plain splat before a pinhole. Returns the number of
+    /// fragments.
+    #[inline(always)]
+    fn sum_plain(&self, list: &PlaceList, surface: &SplatSurface, sums: &mut SurfaceSums) -> u32 {
+        if sums.is_grey() {
+            self.sum_plain_to(list, surface, sums.cells_mut::<GREY>())
+        } else {
+            self.sum_plain_to(list, surface, sums.cells_mut::<COLOR>())
+        }
+    }
+
+    /// [`Self::sum_plain`] to cells of `LINES` lines.
+    ///
+    /// In two loops, each so short that the processor sees several of its turns at once.
+    #[inline(always)]
+    fn sum_plain_to<const LINES: usize>(
+        &self,
+        list: &PlaceList,
+        surface: &SplatSurface,
+        (cells, squares): (&mut [[Line; LINES]], &mut [Eight]),
+    ) -> u32 {
+        let patterns = self.samples.patterns();
+        let center = [self.splat.constants.xi, self.splat.constants.yi];
+        let distorted = &DistortedSamples::default();
+        let squares = &mut squares[..list.places().len()];
+        let (pairs, last) = list.places().as_chunks::<2>();
+        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
+        for group in 0..self.samples.groups() {
+            let samples = self.samples.group(group);
+            let source = Source { list, patterns, samples, distorted, group, center };
+            let (pair_squares, last_square) = squares.as_chunks_mut::<2>();
+            for (&[a, b], [first, second]) in pairs.iter().zip(&mut *pair_squares) {
+                if L::CELLS == 2 {
+                    let hits = self.square_plain(&source, [a, b]);
+                    hits.store_cell::<0>(first);
+                    hits.store_cell::<1>(second);
+                } else {
+                    self.square_plain(&source, [a; 2]).store_cell::<0>(first);
+                    self.square_plain(&source, [b; 2]).store_cell::<0>(second);
+                }
+            }
+            if let (&[place], [square]) = (last, &mut *last_square) {
+                self.square_plain(&source, [place; 2]).store_cell::<0>(square);
+            }
+            let cell = |place| cell_of(place, group);
+            for (&[a, b], [first, second]) in pairs.iter().zip(&*pair_squares) {
+                if L::CELLS == 2 {
+                    let weight = self.weights(L::load_cells(first, second), &mut misses);
+                    surface_sums::add(cells, [cell(a), cell(b)], weight, surface.color);
+                } else {
+                    let weight = self.weights(L::load(first), &mut misses);
+                    surface_sums::add(cells, [cell(a); 2], weight, surface.color);
+                    let weight = self.weights(L::load(second), &mut misses);
+                    surface_sums::add(cells, [cell(b); 2], weight, surface.color);
+                }
+            }
+            if let (&[place], [square]) = (last, &*last_square) {
+                let weight = self.weights(L::load(square), &mut last_misses);
+                surface_sums::add(cells, [cell(place); 2], weight, surface.color);
+            }
+        }
+        Self::count_hits(list.places().len() * self.samples.groups(), misses, last_misses)
+    }
+
+    /// The squares of (u, v) of a plain splat before a pinhole in one place (given twice), or in two; not numbers where it is
+    /// not hit.
+    #[inline(always)]
+    fn square_plain(&self, source: &Source<'_>, places: [u16; 2]) -> L {
+        let hits = self.evaluate::<PINHOLE, true>(source, places);
+        hits.r2 | hits.missed
+    }
+
+    /// Weights of hits, 0 where there is none (where the square of (u, v) is not a number). Adds to `misses` where there is none.
+    #[inline(always)]
+    fn weights(&self, r2: L, misses: &mut L) -> L {
+        let missed = r2.not_less_or_equal(L::splat(f32::INFINITY));
+        let weight = self.weight_scale * self.table.kernel(r2, missed);
+        // Not a number where it is not hit.
+        let missed = L::splat(0.0).not_less(weight);
+        *misses = *misses + (missed & L::splat(1.0));
+        weight.and_not(missed)
+    }
+
     /// Makes fragments of the hits of a page.
     #[inline(always)]
     fn finish(&self, mut page: Page<'_>, surface: &SplatSurface, target: &mut Target<'_>) {
@@ -339,6 +434,7 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
     /// Adds the hits of a page to the sums of their cells. Returns the number of fragments.
     #[inline(always)]
     fn sum(&self, page: &Page<'_>, surface: &SplatSurface, sums: &mut SurfaceSums) -> u32 {
+        sums.need_ends();
         let (records, keys) = page.records_and_keys();
         let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
         let (pairs, last) = records.as_chunks::<2>();

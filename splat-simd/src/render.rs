@@ -11,7 +11,7 @@ use crate::records::{RecordBuffer, cell_of};
 use crate::resolve::{ResolveCell, ResolveJob, SummedSurfaces, Surfaces};
 use crate::samples::{DistortedSamples, LaneSamples};
 use crate::shade::{LaneImages, TileShader};
-use crate::surface_sums::{FindLayered, SurfaceSums};
+use crate::surface_sums::{COLOR, FindLayered, GREY, SurfaceSums};
 use rayon::prelude::*;
 use splat_abuffer::{Fragment, Resolve, SampleColor, SplatSurface, Thickness};
 use splat_core::memory::Budget;
@@ -515,8 +515,13 @@ impl<'a> Picture<'a> {
         match self.options.resolve {
             Resolve::Surface { coverage, .. } if summed => {
                 let mut sums = std::mem::take(&mut worker.sums);
-                let mut cells = SummedSurfaces { coverage, sums: &mut sums };
-                self.resolve_cells(worker, region, lattice, &mut cells, pixels, film);
+                if sums.is_grey() {
+                    let mut cells = SummedSurfaces::<GREY> { coverage, sums: &mut sums };
+                    self.resolve_cells(worker, region, lattice, &mut cells, pixels, film);
+                } else {
+                    let mut cells = SummedSurfaces::<COLOR> { coverage, sums: &mut sums };
+                    self.resolve_cells(worker, region, lattice, &mut cells, pixels, film);
+                }
                 worker.sums = sums;
             }
             Resolve::Surface { coverage, thickness: Thickness::AroundHit } if few(self.options.aovs) => {
@@ -566,7 +571,7 @@ impl<'a> Picture<'a> {
             return None;
         }
         let groups = self.samples.groups();
-        worker.sums.prepare(groups);
+        worker.sums.prepare(groups, !self.frame.set_up.colored);
         worker.records.clear(groups, false, usize::MAX);
         worker.records.forget();
         let [tests, fragments] = match lens_samples {

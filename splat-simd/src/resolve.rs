@@ -132,17 +132,17 @@ impl<const OPAQUE: bool> ResolveCell for Surfaces<OPAQUE> {
 }
 
 /// [`Surfaces`] of which most are summed already.
-pub struct SummedSurfaces<'a> {
+pub struct SummedSurfaces<'a, const LINES: usize> {
     /// How much of a sample a surface covers.
     pub coverage: Coverage,
-    /// The sums of the cells of one layer.
+    /// The sums of the cells of one layer, of `LINES` lines each.
     pub sums: &'a mut SurfaceSums,
 }
 
-impl ResolveCell for SummedSurfaces<'_> {
+impl<const LINES: usize> ResolveCell for SummedSurfaces<'_, LINES> {
     #[inline(always)]
     fn is_empty(&self, buffer: &RecordBuffer, cell: usize) -> bool {
-        self.sums.is_empty(cell) && buffer.is_empty(cell)
+        self.sums.is_empty::<LINES>(cell) && buffer.is_empty(cell)
     }
 
     #[inline(always)]
@@ -151,7 +151,7 @@ impl ResolveCell for SummedSurfaces<'_> {
             return Surfaces::<true> { coverage: self.coverage }.resolve_cell(buffer, cell);
         }
         let mut colors = Colors::nothing();
-        colors.composite::<true>(&self.sums.take(cell), self.coverage);
+        colors.composite::<true>(&self.sums.take::<L, LINES>(cell), self.coverage);
         colors
     }
 }

@@ -5,6 +5,7 @@
 
 use super::bounds::Extent;
 use super::error_bound::EPSILON;
+use super::number::greater;
 use super::{Reach, View};
 use crate::evaluate::SplatConstants;
 
@@ -53,7 +54,8 @@ pub fn without_lens(
     let denominator = dot(h, ed) + EPSILON * (3.0 * dot(h, d) + g_max);
     let error = (numerators + 2.0 * radius * denominator) / g_min;
     let usual = USUAL * radius;
-    (error < MAX_ERROR).then_some(Margin { radius: radius + usual.max(2.0 * error - usual), edge_on: 0.0 })
+    (error < MAX_ERROR)
+        .then_some(Margin { radius: radius + greater(2.0 * error - usual, usual), edge_on: 0.0 })
 }
 
 /// The margin of a splat seen through a lens.

@@ -11,6 +11,7 @@
 mod bounds;
 mod error_bound;
 mod margin;
+mod number;
 mod order;
 mod outline;
 mod projection;
@@ -33,6 +34,7 @@ use crate::texture::ScalarLookup;
 use crate::{Cloud, PixelRect, RenderOptions, Shapes, srgb};
 use glam::DVec3;
 use margin::Margin;
+use number::greater;
 use outline::Ellipse;
 use splat_abuffer::{Resolve, SplatSurface, Thickness};
 use std::collections::BTreeMap;
@@ -99,6 +101,8 @@ pub struct SetUp {
     pub splats: Vec<VisibleSplat>,
     /// What the fragments of each share, by rank.
     pub surfaces: Vec<SplatSurface>,
+    /// Whether some of them are of a colour, not of a grey.
+    pub colored: bool,
     /// Splats that were never rendered, by cause: [`crate::Defect::name`], or `edge_on`.
     pub dropped: Dropped,
 }
@@ -120,6 +124,7 @@ impl SetUp {
     pub fn clear(&mut self) {
         self.splats.clear();
         self.surfaces.clear();
+        self.colored = false;
         self.dropped.clear();
     }
 
@@ -154,7 +159,7 @@ impl SetUp {
         let Some(margin) = rounding_margin(&splat, &exact, &image.screen, view) else {
             return Outcome::EdgeOn;
         };
-        let radius = margin.radius.max(usual);
+        let radius = greater(margin.radius, usual);
         if radius > usual {
             let Some(wider) = Image::new(&splat, &exact, radius, view) else { return Outcome::EdgeOn };
             bounds = candidates(&splat, &wider.screen, radius, view);
@@ -168,7 +173,9 @@ impl SetUp {
             return Outcome::EdgeOn;
         }
         let depth = view.depth_extent(&splat, radius);
-        self.surfaces.push(surface(cloud, index, &splat, &exact, view, options));
+        let surface = surface(cloud, index, &splat, &exact, view, options);
+        self.colored |= surface.color != [surface.color[0]; 3];
+        self.surfaces.push(surface);
         self.splats.push(VisibleSplat {
             constants,
             bounds,
@@ -187,6 +194,7 @@ impl SetUp {
     pub fn append(&mut self, next: &mut Self) {
         self.splats.append(&mut next.splats);
         self.surfaces.append(&mut next.surfaces);
+        self.colored |= std::mem::take(&mut next.colored);
         self.add_dropped(std::mem::take(&mut next.dropped));
     }
 
@@ -282,7 +290,10 @@ fn is_plain(constants: &SplatConstants<f64>, bounds: &PixelRect, depth: Extent, 
         let room = view.max_jitter();
         let center = constants.pixel();
         let farthest = |center: f64, first: i32, end: i32| {
-            (f64::from(first) + 0.5 - room - center).abs().max((f64::from(end) - 0.5 + room - center).abs())
+            greater(
+                (f64::from(first) + 0.5 - room - center).abs(),
+                (f64::from(end) - 0.5 + room - center).abs(),
+            )
         };
         let slope = constants.h[0].abs() * farthest(center.x, bounds.x0, bounds.x1)
             + constants.h[1].abs() * farthest(center.y, bounds.y0, bounds.y1);
@@ -350,21 +361,24 @@ pub(crate) fn world_axes(cloud: &Cloud, index: usize, normal: DVec3) -> [DVec3; 
     match &cloud.shapes {
         Shapes::Discs(sizes) => {
             let size = f64::from(sizes[index]);
-            let tu = perpendicular(normal).normalize();
+            // Of the normal as it stands: so it need not wait for the unit one.
+            let tu = perpendicular(cloud.normals[index].as_dvec3()).normalize();
             [size * tu, size * normal.cross(tu)]
         }
         Shapes::Ellipses(axes) => axes[index].map(|axis| axis.as_dvec3()),
     }
 }
 
-/// A vector perpendicular to a unit vector: the product of the coordinate axis that is farthest from it and the vector.
+/// A vector perpendicular to another one: the product of the coordinate axis that is farthest from it and the vector.
 fn perpendicular(normal: DVec3) -> DVec3 {
     let [x, y, z] = normal.to_array();
     let [ax, ay, az] = normal.abs().to_array();
-    // Looked up, not branched to: which axis it is cannot be foreseen.
-    let products = [DVec3::new(0.0, -z, y), DVec3::new(z, 0.0, -x), DVec3::new(-y, x, 0.0)];
-    let not_x = ax > ay || ax > az;
-    products[usize::from(not_x) + usize::from(not_x && ay > az)]
+    // Weighed, not branched to: which axis it is cannot be foreseen.
+    let number = |yes: bool| if yes { 1.0 } else { 0.0 };
+    let not_x = number((ax > ay) | (ax > az));
+    let is_z = not_x * number(ay > az);
+    let [is_x, is_y] = [1.0 - not_x, not_x - is_z];
+    DVec3::new(is_y * z - is_z * y, is_z * x - is_x * z, is_x * y - is_y * x)
 }
 
 /// The exact box of a disc of `radius` sigma as a pinhole sees it: `[x, y]` in pixels (L106-125, corrected). `None` if

@@ -1,6 +1,7 @@
 //! The ellipse that a splat is in the picture: its box, and for whoever visits row by row its outline.
 
 use super::bounds::Extent;
+use super::number::{greater, lesser};
 use crate::distortion::FilmMap;
 use crate::evaluate::SplatConstants;
 use glam::{DMat2, DVec2};
@@ -45,7 +46,7 @@ impl Outline {
     #[inline(always)]
     pub(super) fn new(ellipse: &Ellipse, [xf, yf]: [f64; 2]) -> Self {
         let &Ellipse { center, half: [half_width, half_height], sxy, determinant } = ellipse;
-        let reach = (center[0].abs() + half_width).max(center[1].abs() + half_height);
+        let reach = greater(center[0].abs() + half_width, center[1].abs() + half_height);
         if !(reach < MAX_REACH && half_height > 0.0 && half_width > 0.0) {
             return Self::EVERYTHING;
         }
@@ -55,7 +56,7 @@ impl Outline {
             half_width: half_width as f32,
             inverse_half_height: (half_width * inverse_product) as f32,
             correlation: (sxy * inverse_product) as f32,
-            narrowing: (determinant.sqrt() * inverse_product).min(1.0) as f32,
+            narrowing: lesser(determinant.sqrt() * inverse_product, 1.0) as f32,
         }
     }
 

@@ -1,13 +1,13 @@
 //! The splat-centred constants of a splat: SPEC section 3, notes 3.4; they replace L86-106.
 
 use super::bounds::{deep_reference, half_depth};
-use super::view::floor;
+use super::number::floor;
 use super::{CameraSplat, View};
 use crate::evaluate::SplatConstants;
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
-/// Below this ratio of |det J| to the product of its rows a splat is seen edge-on, and dropped.
-const EDGE_ON: f64 = 1.0 / (1u64 << 40) as f64;
+/// Below this ratio of (det J)^2 to the product of its rows' squares a splat is seen edge-on, and dropped.
+const EDGE_ON: f64 = 1.0 / (1u128 << 80) as f64;
 
 /// A reference point farther than this from pixel 0 (in pixels) does not fit the integer part of the offset.
 const MAX_PIXEL: f64 = (1u64 << 30) as f64;
@@ -37,8 +37,10 @@ fn jacobian(splat: &CameraSplat, point: DVec3, view: &View) -> (DVec2, [DVec2; 2
     if view.orthographic {
         return (point.xy(), splat.axes.map(|t| t.xy() * scale));
     }
-    let screen = point.xy() / point.z;
-    (screen, splat.axes.map(|t| (t.xy() - screen * t.z) * scale / point.z))
+    let inverse = 1.0 / point.z;
+    let screen = point.xy() * inverse;
+    let scale = scale * inverse;
+    (screen, splat.axes.map(|t| (t.xy() - screen * t.z) * scale))
 }
 
 /// The constants of a splat, exact to `f64`. `None` if it is seen edge-on.
@@ -54,7 +56,7 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
 
     let (screen, rows) = jacobian(splat, point, view);
     let determinant = rows[0].perp_dot(rows[1]);
-    let has_area = determinant.abs() > EDGE_ON * (rows[0].length_squared() * rows[1].length_squared()).sqrt();
+    let has_area = determinant * determinant > EDGE_ON * rows[0].length_squared() * rows[1].length_squared();
     if !has_area {
         return None;
     }
@@ -62,17 +64,19 @@ pub fn project(splat: &CameraSplat, view: &View) -> Option<SplatConstants<f64>> 
     // Rotate the basis by the (c, s) that makes the new second row horizontal: J' = [[p, q], [m, 0]]. Then
     // u = dy / q depends on dy alone, and v = (dx - u p) / m. r2 does not change.
     let q = DVec2::new(rows[0].y, rows[1].y).length();
-    let [c, s] = [rows[0].y / q, rows[1].y / q];
+    let a1 = 1.0 / q;
+    let [c, s] = [rows[0].y * a1, rows[1].y * a1];
     let rotate = |first: f64, second: f64| [c * first + s * second, c * second - s * first];
     let p = rotate(rows[0].x, rows[1].x)[0];
-    let m = -determinant / q;
-    let a1 = 1.0 / q;
-    let b = [1.0 / m, -p / (q * m)];
+    // m is -det J / q.
+    let inverse_m = -q / determinant;
+    let b = [inverse_m, -p * a1 * inverse_m];
     let depth_slope = rotate(t1.z, t2.z);
     let h = if view.orthographic {
         [0.0; 2]
     } else {
-        [-b[0] * depth_slope[1] / point.z, -(a1 * depth_slope[0] + b[1] * depth_slope[1]) / point.z]
+        let inverse = 1.0 / point.z;
+        [-b[0] * depth_slope[1] * inverse, -(a1 * depth_slope[0] + b[1] * depth_slope[1]) * inverse]
     };
 
     let pixel = screen * scale + view.principal_point;

@@ -1,6 +1,7 @@
 //! What set-up needs of camera and options, computed once a frame.
 
 use super::bounds::{Extent, half_depth};
+use super::number::{floor, greater, lesser};
 use super::{BOX_PADDING, CameraSplat};
 use crate::distortion::FilmMap;
 use crate::{Camera, Cloud, Lens, PixelRect, RenderOptions, Shapes};
@@ -147,7 +148,7 @@ impl View {
     /// The depths of the visible part of a disc of `radius` sigma.
     pub(super) fn depth_extent(&self, splat: &CameraSplat, radius: f64) -> Extent {
         let extent = half_depth(splat, radius);
-        Extent { min: (splat.center.z - extent).max(self.near), max: splat.center.z + extent }
+        Extent { min: greater(splat.center.z - extent, self.near), max: splat.center.z + extent }
     }
 
     /// Radius of the largest circle of confusion over these depths, in tan units (L136-141; errata E6-E9).
@@ -167,12 +168,12 @@ impl View {
     pub(super) fn reach(&self, from: DVec2, screen: &[Extent; 2]) -> Reach {
         let room = self.filter_radius + 1.0;
         let farthest =
-            |axis: usize, min: f64, max: f64| (min - from[axis]).abs().max((max - from[axis]).abs());
+            |axis: usize, min: f64, max: f64| greater((min - from[axis]).abs(), (max - from[axis]).abs());
         Reach {
             of_splat: [0, 1].map(|axis| farthest(axis, screen[axis].min, screen[axis].max)),
             in_frame: [0, 1].map(|axis| {
                 let Extent { min, max } = self.seen[axis];
-                farthest(axis, screen[axis].min.max(min) - room, screen[axis].max.min(max) + room)
+                farthest(axis, greater(screen[axis].min, min) - room, lesser(screen[axis].max, max) + room)
             }),
         }
     }
@@ -189,9 +190,9 @@ impl View {
     #[inline(always)]
     fn film_pixels_that_reach(&self, screen: &[Extent; 2]) -> PixelRect {
         let room = self.filter_radius + BOX_PADDING;
-        // Integers saturate, and the window is far smaller than their range.
-        let first = |extent: Extent| floor(room + 0.5 - extent.min).saturating_neg();
-        let end = |extent: Extent| floor(extent.max + room - 0.5).saturating_add(1);
+        // The window is far smaller than the range of these integers.
+        let first = |extent: Extent| -floor(room + 0.5 - extent.min);
+        let end = |extent: Extent| floor(extent.max + room - 0.5) + 1;
         let [x, y] = *screen;
         PixelRect::new(first(x), first(y), end(x), end(y)).intersect(&self.window)
     }
@@ -205,11 +206,4 @@ pub(crate) struct Reach {
     pub of_splat: [f64; 2],
     /// Of samples in the frame that a pinhole's hit may have.
     pub in_frame: [f64; 2],
-}
-
-/// The greatest integer not above a number, as far as there are integers. (`f64::floor` is a call where the processor's
-/// oldest ancestors lack it.)
-pub(super) fn floor(value: f64) -> i32 {
-    let truncated = value as i32;
-    if f64::from(truncated) > value { truncated.saturating_sub(1) } else { truncated }
 }
