@@ -5,7 +5,7 @@ use crate::interval_bounds::IntervalBounds;
 use crate::lanes::{Eight, Kernel, LANES, Lanes, prefetch};
 use crate::lattice::{CellList, Lattice};
 use crate::places::{Apart, PLACES, PlaceList, TILE, clip as clip_hits};
-use crate::records::{Key, Page, Record, RecordBuffer, cell_of};
+use crate::records::{Key, Page, Record, RecordBuffer};
 use crate::samples::{DistortedSamples, GroupSamples, LaneSamples, limits};
 use crate::surface_sums::{self, COLOR, GREY, Line, SurfaceSums};
 use splat_abuffer::SplatSurface;
@@ -359,47 +359,74 @@ impl<'a, L: Lanes, T: LaneTable> Evaluation<'a, L, T> {
         surface: &SplatSurface,
         (cells, squares): (&mut [[Line; LINES]], &mut [Eight]),
     ) -> u32 {
-        let patterns = self.samples.patterns();
-        let center = [self.splat.constants.xi, self.splat.constants.yi];
-        let distorted = &DistortedSamples::default();
         let squares = &mut squares[..list.places().len()];
-        let (pairs, last) = list.places().as_chunks::<2>();
-        let (mut misses, mut last_misses) = (L::splat(0.0), L::splat(0.0));
+        let mut misses = [L::splat(0.0); 2];
         for group in 0..self.samples.groups() {
-            let samples = self.samples.group(group);
-            let source = Source { list, patterns, samples, distorted, group, center };
-            let (pair_squares, last_square) = squares.as_chunks_mut::<2>();
-            for (&[a, b], [first, second]) in pairs.iter().zip(&mut *pair_squares) {
-                if L::CELLS == 2 {
-                    let hits = self.square_plain(&source, [a, b]);
-                    hits.store_cell::<0>(first);
-                    hits.store_cell::<1>(second);
-                } else {
-                    self.square_plain(&source, [a; 2]).store_cell::<0>(first);
-                    self.square_plain(&source, [b; 2]).store_cell::<0>(second);
-                }
-            }
-            if let (&[place], [square]) = (last, &mut *last_square) {
-                self.square_plain(&source, [place; 2]).store_cell::<0>(square);
-            }
-            let cell = |place| cell_of(place, group);
-            for (&[a, b], [first, second]) in pairs.iter().zip(&*pair_squares) {
-                if L::CELLS == 2 {
-                    let weight = self.weights(L::load_cells(first, second), &mut misses);
-                    surface_sums::add(cells, [cell(a), cell(b)], weight, surface.color);
-                } else {
-                    let weight = self.weights(L::load(first), &mut misses);
-                    surface_sums::add(cells, [cell(a); 2], weight, surface.color);
-                    let weight = self.weights(L::load(second), &mut misses);
-                    surface_sums::add(cells, [cell(b); 2], weight, surface.color);
-                }
-            }
-            if let (&[place], [square]) = (last, &*last_square) {
-                let weight = self.weights(L::load(square), &mut last_misses);
-                surface_sums::add(cells, [cell(place); 2], weight, surface.color);
+            self.square_places(list, group, squares);
+            let cells = &mut cells[group * PLACES..][..PLACES];
+            self.sum_places(list.places(), squares, surface, cells, &mut misses);
+        }
+        let [misses, last_misses] = misses;
+        Self::count_hits(squares.len() * self.samples.groups(), misses, last_misses)
+    }
+
+    /// The squares of (u, v) in a group of samples of some places; not numbers where the splat is not hit.
+    #[inline(always)]
+    fn square_places(&self, list: &PlaceList, group: usize, squares: &mut [Eight]) {
+        let source = Source {
+            list,
+            patterns: self.samples.patterns(),
+            samples: self.samples.group(group),
+            distorted: &DistortedSamples::default(),
+            group,
+            center: [self.splat.constants.xi, self.splat.constants.yi],
+        };
+        let (pairs, last) = list.places().as_chunks::<2>();
+        let (pair_squares, last_square) = squares.as_chunks_mut::<2>();
+        for (&[a, b], [first, second]) in pairs.iter().zip(pair_squares) {
+            if L::CELLS == 2 {
+                let squares = self.square_plain(&source, [a, b]);
+                squares.store_cell::<0>(first);
+                squares.store_cell::<1>(second);
+            } else {
+                self.square_plain(&source, [a; 2]).store_cell::<0>(first);
+                self.square_plain(&source, [b; 2]).store_cell::<0>(second);
             }
         }
-        Self::count_hits(list.places().len() * self.samples.groups(), misses, last_misses)
+        if let (&[place], [square]) = (last, last_square) {
+            self.square_plain(&source, [place; 2]).store_cell::<0>(square);
+        }
+    }
+
+    /// Adds hits in some places, given by the squares of (u, v), to the sums of their cells, and to `misses` where there is none:
+    /// in pairs of places, and in the last one.
+    #[inline(always)]
+    fn sum_places<const LINES: usize>(
+        &self,
+        places: &[u16],
+        squares: &[Eight],
+        surface: &SplatSurface,
+        cells: &mut [[Line; LINES]],
+        [misses, last_misses]: &mut [L; 2],
+    ) {
+        let (pairs, last) = places.as_chunks::<2>();
+        let (pair_squares, last_square) = squares.as_chunks::<2>();
+        for (&[a, b], [first, second]) in pairs.iter().zip(pair_squares) {
+            let [a, b] = [usize::from(a), usize::from(b)];
+            if L::CELLS == 2 {
+                let weight = self.weights(L::load_cells(first, second), misses);
+                surface_sums::add(cells, [a, b], weight, surface.color);
+            } else {
+                let weight = self.weights(L::load(first), misses);
+                surface_sums::add(cells, [a; 2], weight, surface.color);
+                let weight = self.weights(L::load(second), misses);
+                surface_sums::add(cells, [b; 2], weight, surface.color);
+            }
+        }
+        if let (&[place], [square]) = (last, last_square) {
+            let weight = self.weights(L::load(square), last_misses);
+            surface_sums::add(cells, [usize::from(place); 2], weight, surface.color);
+        }
     }
 
     /// The squares of (u, v) of a plain splat before a pinhole in one place (given twice), or in two; not numbers where it is

@@ -709,6 +709,25 @@ fn sheets_agree() {
     }
 }
 
+/// Surfaces of one side before a pinhole: they are summed, in colour or grey, and what is layered is found by bounds.
+#[test]
+fn summed_surfaces_agree() {
+    let coverage = prop_oneof![Just(OPAQUE), Just(soft(1.0)), Just(soft(0.5)), Just(soft(8.0))];
+    let case = (layered(), coverage, 1u32..18, any::<bool>(), any::<bool>());
+    check(48, 8, case, |((made, thickness, seed), resolve, samples, is_grey, is_narrow)| {
+        let mut cloud = sheets(&Sheets { clear: false, facing: Facing::Front, ..made }, seed);
+        cloud.opacities = None;
+        if is_grey {
+            cloud.colors = None;
+        }
+        let filter = if is_narrow { PixelFilter::Box } else { RenderOptions::default().filter };
+        let options =
+            RenderOptions { samples, resolve, thickness, filter, cull: true, ..RenderOptions::default() };
+        let tile_memory = &TILE_MEMORY[seed as usize % 3..];
+        check_pictures(&cloud, &pinhole(40, 36, 60.0), &options, &[2], tile_memory);
+    });
+}
+
 /// `over`, in lanes: nearly sorted and not, many fragments of one depth, more than 64 a sample, and alphas at the limit.
 #[test]
 fn fragments_laid_over_each_other_agree() {
