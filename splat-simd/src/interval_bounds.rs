@@ -104,10 +104,9 @@ impl IntervalBounds {
 mod tests {
     use super::*;
     use crate::lanes::{Kernel, Level};
-    use crate::places::tests::splat as splat_of;
+    use crate::places::tests::{config, splat as splat_of};
     use crate::places::{TILE, pixel_of};
     use proptest::prelude::*;
-    use proptest::test_runner::RngSeed;
     use splat_core::PixelRect;
     use splat_core::evaluate::Limits;
     use splat_core::setup::Outline;
@@ -138,13 +137,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig {
-            cases: 2000,
-            failure_persistence: None,
-            // The same cases in every run.
-            rng_seed: RngSeed::Fixed(1),
-            ..ProptestConfig::default()
-        })]
+        #![proptest_config(config())]
 
         #[test]
         fn bounds_hold_every_fragment_and_little_more(

@@ -20,6 +20,7 @@ mod resolve;
 mod samples;
 mod shade;
 mod surface_sums;
+mod table;
 pub mod texture;
 
 pub use compare::{Difference, Method, compare, fragments};

@@ -275,6 +275,16 @@ pub(crate) mod tests {
         }
     }
 
+    /// The same two thousand cases in every run.
+    pub(crate) fn config() -> ProptestConfig {
+        ProptestConfig {
+            cases: 2000,
+            failure_persistence: None,
+            rng_seed: RngSeed::Fixed(1),
+            ..ProptestConfig::default()
+        }
+    }
+
     /// A splat of which nothing but the outline and the bounds matters.
     pub(crate) fn splat(outline: Outline, bounds: PixelRect) -> VisibleSplat {
         let constants = SplatConstants {
@@ -346,13 +356,7 @@ pub(crate) mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig {
-            cases: 2000,
-            failure_persistence: None,
-            // The same cases in every run.
-            rng_seed: RngSeed::Fixed(1),
-            ..ProptestConfig::default()
-        })]
+        #![proptest_config(config())]
 
         #[test]
         fn rows_hold_the_padded_outline_and_little_more(

@@ -20,7 +20,7 @@ pub const GREY: usize = 1;
 pub const COLOR: usize = 2;
 
 /// Two sums of each sample of a cell, in a cache line.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct Line([Eight; 2]);
 
@@ -88,9 +88,9 @@ impl SurfaceSums {
     #[inline(always)]
     pub fn add<L: Lanes>(&mut self, cells: [usize; 2], depth: L, weight: L, surface: &SplatSurface) {
         if self.is_grey {
-            add(self.cells_mut::<GREY>().0, cells, weight, surface.color);
+            add_weights(self.cells_mut::<GREY>().0, cells, weight, surface.color);
         } else {
-            add(self.cells_mut::<COLOR>().0, cells, weight, surface.color);
+            add_weights(self.cells_mut::<COLOR>().0, cells, weight, surface.color);
         }
         let [first, second] = cells;
         let [near, far] = interval(depth, surface);
@@ -164,7 +164,7 @@ impl SurfaceSums {
 
 /// Adds weights, and weights times colours, to the sums of a cell, or of two different ones.
 #[inline(always)]
-pub fn add<L: Lanes, const LINES: usize>(
+pub fn add_weights<L: Lanes, const LINES: usize>(
     cells: &mut [[Line; LINES]],
     [first, second]: [usize; 2],
     weight: L,
